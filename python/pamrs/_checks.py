@@ -18,26 +18,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "as_numbers",
-    "as_said",
-    "by_hand",
-    "check_column",
-    "checked_number",
-    "checked_table",
-    "doubt",
-    "doubt_pascals",
-    "finite",
-    "is_quantity",
-    "one_of",
-    "plain",
-    "positive",
-    "quantities",
-    "rising",
-    "whole",
-    "without_units",
-]
-
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
 _LEAST_PRESSURE = 50.0  # [Pa] below which no muscle notices a pressure
@@ -46,10 +26,56 @@ _LEAST_PRESSURE = 50.0  # [Pa] below which no muscle notices a pressure
 def as_said(value: object) -> str:
     """A value as a message has it: a line of it at most, and no error of its own."""
     try:
-        text = repr(value)
+        plain_scalar = type(value).__module__ == "numpy" and getattr(value, "shape", None) == ()
+        text = repr(value.item() if plain_scalar else value)  # type: ignore[attr-defined]
     except ValueError:  # a whole number of more digits than Python prints
         text = f"a {type(value).__name__} that is too long to print"
     return text if len(text) <= _MOST_SAID else f"{text[: _MOST_SAID - 3]}..."
+
+
+def refused(name: str, value: object, needed: str) -> ParameterError:
+    """The error for an argument: its name, what was given, and what is allowed."""
+    return ParameterError(f"{name} = {as_said(value)} is not allowed: {needed}")
+
+
+def check_kind(name: str, value: object, kind: type | tuple[type, ...], needed: str) -> None:
+    """Refuse what is of another type; the error says which it is, and what is needed."""
+    if not isinstance(value, kind):
+        raise ParameterError(f"{name} is a {type(value).__name__}; {needed} is needed")
+
+
+def check_names(what: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Refuse names that are none of those known; the error has them all."""
+    there = list(known)
+    for name in names:
+        if name not in there:
+            listed = ", ".join(map(repr, there)) or "none"
+            raise ParameterError(f"{what} has {name!r}, which is not there; there are: {listed}")
+
+
+def as_column(name: str, values: Any) -> NDArray[np.float64]:
+    """An array of one dimension, with one number at least."""
+    import numpy as np
+
+    without_units(name, values)
+    try:
+        column = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise refused(name, values, "numbers are needed") from None
+    if column.ndim != 1 or column.size == 0:
+        raise ParameterError(f"{name} has the shape {column.shape}; (n,) with n >= 1 is needed")
+    return column
+
+
+def contraction_of(contraction: Any, length: Any, rest_length: float) -> Any:
+    """The contraction [1] that is given, by itself or by a length [m]; one of the two has to be."""
+    import numpy as np
+
+    if (contraction is None) == (length is None):
+        raise ParameterError("give contraction or length, one of the two")
+    if contraction is not None:
+        return plain("contraction", contraction, "1")
+    return 1.0 - np.asarray(plain("length", length, "m"), dtype=np.float64) / rest_length
 
 
 def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
@@ -82,17 +108,13 @@ def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
     try:
         return np.asarray(values, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(
-            f"{name} = {as_said(values)} is not allowed: numbers are needed"
-        ) from None
+        raise refused(name, values, "numbers are needed") from None
 
 
 def without_units(name: str, values: Any) -> None:
     """Refuse quantities of pint where units are not converted: arrays would lose theirs."""
     if _with_units(values):
-        raise ParameterError(
-            f"{name} = {as_said(values)} is not allowed: plain numbers are needed here, in SI units"
-        )
+        raise refused(name, values, "plain numbers are needed here, in SI units")
 
 
 def is_quantity(value: Any) -> bool:
@@ -124,10 +146,8 @@ def plain(name: str, value: Any, unit: str) -> Any:
     try:
         return value.to(_POWER.sub("**", "dimensionless" if unit == "1" else unit)).magnitude
     except Exception as error:  # of its own library, which is not imported here
-        raise ParameterError(
-            f"{name} = {as_said(value)} is not allowed: a quantity in {unit} or a unit of the same "
-            f"dimension is needed ({error})"
-        ) from None
+        needed = f"a quantity in {unit} or a unit of the same dimension is needed ({error})"
+        raise refused(name, value, needed) from None
 
 
 #: SI units of the arguments of public functions, which mean the same wherever they are taken; of a
@@ -219,17 +239,15 @@ def positive(name: str, value: float, *, zero: bool = False) -> float:
     """
     number = _number(value)
     if not (math.isfinite(number) and (number > 0.0 or (zero and number == 0.0))):
-        raise ParameterError(
-            f"{name} = {as_said(value)} is not allowed: a finite number "
-            f"{'from' if zero else 'above'} zero is needed"
-        )
+        least = "from" if zero else "above"
+        raise refused(name, value, f"a finite number {least} zero is needed")
     return number
 
 
 def finite(name: str, value: Any) -> float:
     """The value, if it is a finite number; an error names it otherwise."""
     if not math.isfinite(number := _number(value)):
-        raise ParameterError(f"{name} = {as_said(value)} is not allowed: a finite number is needed")
+        raise refused(name, value, "a finite number is needed")
     return number
 
 
@@ -274,10 +292,7 @@ def whole(name: str, value: Any, least: int = 0, most: int | None = None) -> int
     is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
     if not (is_whole and least <= value and (most is None or value <= most)):
         upper = " on" if most is None else f" to {most}"
-        raise ParameterError(
-            f"{name} = {as_said(value)} is not allowed: a whole number from {least}{upper} is "
-            "needed"
-        )
+        raise refused(name, value, f"a whole number from {least}{upper} is needed")
     return int(value)
 
 
@@ -294,9 +309,7 @@ def rising(name: str, given: Any) -> tuple[float, float]:
     except (TypeError, ValueError):
         low = high = math.nan
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ParameterError(
-            f"{name} = {as_said(given)} is not allowed: two rising finite numbers are needed"
-        )
+        raise refused(name, given, "two rising finite numbers are needed")
     return low, high
 
 
@@ -307,7 +320,7 @@ def one_of(name: str, value: Any, allowed: Iterable[Any], *, also: str = "") -> 
     known = list(allowed)
     if value not in known:
         each = f"{'one of ' * (len(known) > 1)}{', '.join(map(repr, known))}"
-        raise ParameterError(f"{name} = {as_said(value)} is not allowed: {each} is needed{also}")
+        raise refused(name, value, f"{each} is needed{also}")
     return value
 
 
@@ -347,10 +360,8 @@ def checked_number(
     try:
         number = _parsed(value)
     except _NO_NUMBER:
-        raise ParameterError(
-            f"{name} = {as_said(value)} is not allowed: "
-            f"{'' if whole else 'a number is needed, '}{allowed}"
-        ) from None
+        kind = "" if whole else "a number is needed, "
+        raise refused(name, value, f"{kind}{allowed}") from None
     if not (math.isfinite(number) and lower <= number <= upper) or (
         whole and not number.is_integer()
     ):
@@ -408,9 +419,7 @@ def checked_table(name: str, values: Any) -> dict[str, Any]:
         If it is no mapping, or a key is no text.
     """
     if not isinstance(values, Mapping):
-        raise ParameterError(
-            f"{name} = {as_said(values)} is not allowed: a mapping of names is needed"
-        )
+        raise refused(name, values, "a mapping of names is needed")
     for key in values:
         if not isinstance(key, str):
             raise ParameterError(f"{name} has the key {key!r}, which is not allowed: a name is one")

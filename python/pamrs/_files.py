@@ -11,28 +11,6 @@ import tomllib
 from pathlib import Path
 from typing import Any, Final
 
-__all__ = [
-    "MOST_BYTES",
-    "MOST_CELLS",
-    "MOST_COLUMNS",
-    "MOST_DEPTH",
-    "MOST_NAME",
-    "MOST_PARTS",
-    "MOST_PIECE",
-    "MOST_ROWS",
-    "MOST_SIZE",
-    "MOST_TOML_BYTES",
-    "check_regular",
-    "found_outside",
-    "is_inside",
-    "parse_toml",
-    "read_file",
-    "read_toml",
-    "resolved",
-    "shown",
-    "toml_document",
-]
-
 MOST_BYTES: Final = 512 << 20
 """Bytes of a table, packed or unpacked."""
 MOST_TOML_BYTES: Final = 4 << 20

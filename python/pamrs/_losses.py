@@ -13,8 +13,6 @@ import threading
 from collections.abc import Callable
 from typing import Final, TypeVar, overload
 
-__all__ = ["STRICT", "Losses", "reason"]
-
 STRICT: Final = "PAMRS_STRICT"
 """Variable of the environment under which nothing is left out: what fails is raised."""
 

@@ -7,8 +7,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["solve_normal"]
-
 Array = NDArray[np.float64]
 
 _RIDGE: Final = 1e-12

@@ -11,8 +11,6 @@ import time
 from collections.abc import Callable
 from typing import Any, Final
 
-__all__ = ["LOG", "Line", "Steps", "duration_words", "receiver"]
-
 LOG: Final = logging.getLogger("pamrs")
 LOG.addHandler(logging.NullHandler())
 

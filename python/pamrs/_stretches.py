@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["stretches"]
-
 
 def stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Where a flag stays set.

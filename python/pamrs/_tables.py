@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["Columns", "Tabular", "over_time"]
-
 
 class Columns(NamedTuple):
     """What a table has.

@@ -9,8 +9,6 @@ import threading
 from types import FrameType
 from typing import Any, Final, NoReturn, Self
 
-__all__ = ["Termination"]
-
 _NAMES: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 

@@ -14,20 +14,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final, TypeAlias
 
+from pamrs._checks import refused
 from pamrs.channels import channel_of, laboratory_unit
 from pamrs.errors import ParameterError, meant
-
-__all__ = [
-    "COLOURS",
-    "MAX_POINTS",
-    "Panels",
-    "Curve",
-    "View",
-    "decimate",
-    "in_laboratory_units",
-    "legend",
-    "over_time",
-]
 
 #: What draws each panel, by its name, the most telling one first.
 Panels: TypeAlias = "dict[str, Callable[[Any], object]]"
@@ -86,9 +75,10 @@ class View:
             if name not in panels:
                 raise ParameterError(f"what = {name!r} is not allowed; {meant(name, panels)}")
         if isinstance(ax, (str, os.PathLike)):
-            raise ParameterError(
-                f"ax = {os.fspath(ax)!r} is not allowed: Axes of matplotlib are needed, whose "
-                "figure writes a file (savefig)"
+            raise refused(
+                "ax",
+                os.fspath(ax),
+                "Axes of matplotlib are needed, whose figure writes a file (savefig)",
             )
         if not names:
             raise ParameterError(f"there is nothing to draw in {self!r}")

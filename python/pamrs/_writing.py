@@ -13,8 +13,6 @@ from typing import Final
 
 from pamrs.errors import ParameterError
 
-__all__ = ["check_writable", "write_atomically"]
-
 _ROOM: Final = 1 << 20
 """Bytes that must fit where a file is to be written: a result with its page and pictures."""
 
@@ -25,9 +23,8 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
     """
     target = Path(os.path.realpath(path))  # through a symbolic link, not over it
     data = content.encode("utf-8") if isinstance(content, str) else content
-    if (
-        target.exists() and not target.is_file()
-    ):  # a pipe or a terminal: nothing there to keep whole
+    # a pipe or a terminal: nothing there to keep whole
+    if target.exists() and not target.is_file():
         Path(path).write_bytes(data)
         return Path(path)
     temporary = target.with_name(f".{target.name[:40]}.{secrets.token_hex(8)}.tmp")

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
+from pamrs._checks import one_of, refused
 from pamrs.errors import ParameterError
 
 __all__ = [
@@ -185,14 +186,10 @@ def judge(
         If the relation or the basis is unknown, the tolerance is not a number from zero on, or
         there is no source.
     """
-    if relation not in RELATIONS:
-        raise ParameterError(
-            f"relation = {relation!r} is not allowed: one of {', '.join(RELATIONS)}"
-        )
-    if basis not in BASES:
-        raise ParameterError(f"basis = {basis!r} is not allowed: one of {', '.join(BASES)}")
+    one_of("relation", relation, RELATIONS)
+    one_of("basis", basis, BASES)
     if not tolerance >= 0.0:
-        raise ParameterError(f"tolerance = {tolerance} is not allowed: a number from 0 on")
+        raise refused("tolerance", tolerance, "a number from 0 on")
     if not where.strip():
         raise ParameterError(f"where is empty: the fact {fact!r} needs its place in the source")
     gap = float(ours) - float(published)

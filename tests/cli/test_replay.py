@@ -96,7 +96,7 @@ def test_a_recording_that_is_not_there_is_named(
 ) -> None:
     code, _, err = run(capsys, "replay", case, "--recording", "ramps")
     assert code == 2
-    assert "--recording = 'ramps' is not allowed: one of waves, steps is needed" in err
+    assert "--recording = 'ramps' is not allowed: one of 'waves', 'steps' is needed" in err
 
 
 def test_a_model_away_from_its_case_says_where_that_was_looked_for(

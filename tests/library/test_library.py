@@ -219,7 +219,7 @@ def test_every_kind_of_fact_is_used():
 
 
 def test_bad_names_and_files():
-    with pytest.raises(ParameterError, match="Did you mean 'pam_a_1in'"):
+    with pytest.raises(ParameterError, match="did you mean 'pam_a_1in'"):
         library.entry("pam_a_1inch")
     with pytest.raises(ParameterError, match="pressure = -1"):
         free_contraction(library.pam_a_1in(), -1.0)

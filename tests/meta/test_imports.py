@@ -18,11 +18,10 @@ ROOT = Path(__file__).parents[2]
 LAYERS = (
     ("errors",),
     ("units", "channels"),
-    ("declared",),
+    ("declared", "_checks"),
     (
         "comparison",
         "findings",
-        "_checks",
         "_files",
         "_losses",
         "_normal",

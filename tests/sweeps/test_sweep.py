@@ -229,12 +229,15 @@ def test_chunks_part_the_runs(shape, chunk):
         ),
         ({"over": {"arm.payload": [np.nan]}}, r"arm.payload\[0\] = nan"),
         ({"over": {"arm.payload": [1.0, 1.0]}}, "one is given twice"),
-        ({"over": {"arm.payload": [[1.0]]}}, r"arm.payload have the shape \(1, 1\)"),
-        ({"over": {"arm.payload": ["heavy"]}}, "arm.payload are not allowed: numbers"),
+        ({"over": {"arm.payload": [[1.0]]}}, r"arm.payload has the shape \(1, 1\)"),
+        ({"over": {"arm.payload": ["heavy"]}}, "arm.payload = .* is not allowed: numbers"),
         ({"over": {"initial.angle": [0.5]}}, "unknown entry 'angle'"),
         ({"metrics": {}}, "metrics is empty"),
         ({"metrics": {"end": "joint_angle"}}, r"metrics\['end'\] = 'joint_angle' is not allowed"),
-        ({"metrics": {"end": ("last", "joint_angle")}}, "reduction 'last'; one of: final, min"),
+        (
+            {"metrics": {"end": ("last", "joint_angle")}},
+            "'last' is not allowed: one of 'final', 'min'",
+        ),
         ({"metrics": {"end": ("final", "angle")}}, "angle"),
         ({"metrics": {"end": ("final", "joint_angle", 1.0)}}, r"metrics\['end'\] = \('final'"),
         (

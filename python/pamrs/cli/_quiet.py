@@ -11,8 +11,6 @@ import typer
 
 from pamrs.cli._shared import QUIET
 
-__all__ = ["with_quiet"]
-
 _OPTION = Annotated[
     bool,
     typer.Option("--quiet", "-q", help="Only the result; of the rest, warnings and errors."),

@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import typer
 
 from pamrs._files import shown
-from pamrs._writing import check_writable
+from pamrs._writing import write_atomically
 from pamrs.cli._streams import terminal
+from pamrs.errors import NotWrittenError, ParameterError, RigError, meant
+from pamrs.units import DIMENSIONS, to_si
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,28 +28,6 @@ if TYPE_CHECKING:
 
     from pamrs.recordings import Recording
     from pamrs.rig import Muscle, Rig
-
-__all__ = [
-    "GEOMETRY",
-    "QUANTITY",
-    "QUIET",
-    "STDOUT",
-    "Contents",
-    "as_given",
-    "check_new",
-    "check_writable",
-    "document",
-    "exact",
-    "file_of",
-    "json_help",
-    "named_muscle",
-    "note",
-    "progress",
-    "quantity",
-    "rig_named",
-    "usable_samples",
-    "write",
-]
 
 _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 QUANTITY = re.compile(
@@ -97,9 +77,6 @@ def as_given(name: str, text: str) -> str:
 
 def quantity(name: str, text: str, dimension: str) -> tuple[float, float | None]:
     """Value and, after ``+-``, standard deviation of a number with a unit, in SI."""
-    from pamrs.errors import ParameterError
-    from pamrs.units import DIMENSIONS, to_si
-
     match = QUANTITY.match(text)
     if match is None or match["unit"] is None:
         raise ParameterError(
@@ -120,8 +97,6 @@ def quantity(name: str, text: str, dimension: str) -> tuple[float, float | None]
 
 def exact(name: str, text: str, dimension: str) -> float:
     """A number with a unit in SI, without a standard deviation."""
-    from pamrs.errors import ParameterError
-
     value, spread = quantity(name, text, dimension)
     if spread is not None:
         raise ParameterError(
@@ -135,7 +110,6 @@ def named_muscle(
 ) -> tuple[Muscle, dict[str, float], Rig | None]:
     """The muscle of a rig file, or of the library, what is known of its geometry, and the rig."""
     from pamrs import library
-    from pamrs.errors import ParameterError, meant
     from pamrs.rig import load_rig
 
     if not name.endswith(".toml") and not Path(name).exists():
@@ -159,7 +133,6 @@ def named_muscle(
 def rig_named(file: Path) -> Rig:
     """A rig file, or a rig of the package by its name."""
     from pamrs import rigs
-    from pamrs.errors import RigError, meant
     from pamrs.rig import load_rig
 
     name = str(file)
@@ -222,9 +195,6 @@ def write(contents: Contents, told: str = "") -> None:
     ParameterError
         If a file cannot be made from what was asked for.
     """
-    from pamrs._writing import write_atomically
-    from pamrs.errors import NotWrittenError, ParameterError
-
     failed: list[str] = []
     refused: ParameterError | None = None
     for path, content in contents.items():

@@ -16,8 +16,6 @@ from typing import IO, Any
 
 from pamrs._files import shown
 
-__all__ = ["guarded", "terminal"]
-
 
 class _Guarded(io.TextIOBase):
     """A text stream whose errors are kept, and in which control characters are shown.

@@ -7,9 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from pamrs.cli._shared import check_writable, document, file_of, json_help, write
-
-__all__ = ["compare_command"]
+from pamrs._writing import check_writable
+from pamrs.cli._shared import document, file_of, json_help, write
 
 
 def compare_command(

@@ -8,8 +8,6 @@ from typing import Annotated, Final
 
 import typer
 
-__all__ = ["VARIABLE", "completion_command", "effect_ids", "muscle_names", "rig_names"]
-
 #: By which a shell asks for completions.
 VARIABLE: Final = "_PAMRS_COMPLETE"
 

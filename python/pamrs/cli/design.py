@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from pamrs._checks import refused
+from pamrs._writing import check_writable, write_atomically
 from pamrs.cli._shared import (
     Contents,
-    check_writable,
     document,
     exact,
     file_of,
@@ -22,6 +23,7 @@ from pamrs.cli._shared import (
     write,
 )
 from pamrs.cli._streams import terminal
+from pamrs.units import bar_and_psi
 
 if TYPE_CHECKING:
     from pamrs.design import (
@@ -31,8 +33,6 @@ if TYPE_CHECKING:
         ParetoFront,
         PressureSearch,
     )
-
-__all__ = ["design_app"]
 
 SCHEMA: Final = "pamrs.joint_design/1"
 _METHODS: Final = ("ga", "de", "cma")
@@ -103,8 +103,6 @@ def _joint(
     check_writable(png, file_of(json), rig_joint)
     if method not in _METHODS:
         raise typer.BadParameter(f"--method = {method!r} is not allowed: {', '.join(_METHODS)}")
-    from pamrs._writing import write_atomically
-    from pamrs.units import bar_and_psi
 
     problem = _problem(
         muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke
@@ -210,7 +208,6 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
     none.
     """
     from pamrs.design import LENGTHS, SYMBOLS
-    from pamrs.errors import ParameterError
 
     names = {**dict(zip(SYMBOLS, LENGTHS, strict=True)), **{name: name for name in LENGTHS}}
     found: dict[str, tuple[float, float]] = {}
@@ -219,12 +216,10 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
         low, colon, high = rest.partition(":")
         key = names.get(name.strip())
         if not equals or not colon or key is None or key in found:
-            reason = (
-                "given twice"
-                if key in found
-                else "LENGTH=LOW:HIGH is needed, like 'lu=10:60 mm', with lu, ru, ll or rl"
-            )
-            raise ParameterError(f"--bounds = {text!r} is not allowed: {reason}")
+            reason = "LENGTH=LOW:HIGH is needed, like 'lu=10:60 mm', with lu, ru, ll or rl"
+            if key in found:
+                reason = "given twice"
+            raise refused("--bounds", text, reason)
         unit = high.strip().lstrip("+-0123456789.eE").strip()
         bare = not low.strip().lstrip("+-0123456789.eE").strip()
         found[key] = (
@@ -239,8 +234,6 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
 
 def _summary(found: _Found) -> str:
     """What goes to standard output behind the title."""
-    from pamrs.units import bar_and_psi
-
     text = found.design.summary()
     if found.lowest is not None:
         text += f"\n\n{found.lowest.summary()}\n{_strict_line(found.strict)}"
@@ -274,8 +267,6 @@ def _bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
 
 def _strict_line(design: JointDesign | None) -> str:
     """What the direct search found."""
-    from pamrs.units import bar_and_psi
-
     if design is None:
         return "strict, direct search: no design was found that any pressure makes good enough"
     assert design.search is not None

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pamrs._files import resolved
+from pamrs._writing import check_writable, write_atomically
 from pamrs.channels import channel_of, with_trait
 from pamrs.cli._shared import (
     STDOUT,
     Contents,
-    check_writable,
     exact,
     file_of,
     json_help,
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis
     from pamrs.findings import Protocol
     from pamrs.recordings import Case
-
-__all__ = ["diagnose_command"]
 
 _MARGIN = 0.05  # share of the recorded range by which commands may leave it unsaid
 
@@ -141,7 +139,6 @@ def diagnose_command(
         raise typer.BadParameter(
             "--channels, --pressure-noise, --angle-noise and --force-noise need --plan"
         )
-    from pamrs._writing import write_atomically
     from pamrs.recordings import load_case
 
     loaded = load_case(case, allow_outside=allow_outside)

@@ -8,8 +8,6 @@ import typer
 
 from pamrs.cli.completion import effect_ids
 
-__all__ = ["effects_command"]
-
 
 def effects_command(
     effect: Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-__all__ = ["example_command"]
+from pamrs.errors import ParameterError
 
 _FILES: Final = Path(__file__).parent / "example_files"
 _DEFAULT: Final = Path("pamrs-example")
@@ -33,8 +33,6 @@ def example_command(
     """
     import shlex
     import shutil
-
-    from pamrs.errors import ParameterError
 
     if folder.is_dir() and any(folder.iterdir()):
         raise ParameterError(

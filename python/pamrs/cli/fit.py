@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from pamrs._checks import refused
+from pamrs._writing import check_writable, write_atomically
 from pamrs.cli._shared import (
     GEOMETRY,
     Contents,
-    check_writable,
     document,
     file_of,
     json_help,
@@ -24,12 +25,11 @@ from pamrs.cli._shared import (
     quantity,
     write,
 )
+from pamrs.errors import ParameterError, RecordingError
 
 if TYPE_CHECKING:
     from pamrs.fit import ForceMap, FrictionFit, ModelComparison, MuscleFit
     from pamrs.rig import Muscle, Rig
-
-__all__ = ["fit_app"]
 
 SCHEMA: Final = "pamrs.muscle_fit/1"
 FRICTION_SCHEMA: Final = "pamrs.friction_fit/1"
@@ -254,7 +254,6 @@ def _friction(
     """
     check_writable(file_of(json), png)
     map_ = _loops(context).with_directions()
-    from pamrs._writing import write_atomically
     from pamrs.fit import fit_friction
     from pamrs.fit.report import render_friction_png
 
@@ -282,7 +281,6 @@ def _rubbing(
     Unasked, friction is fitted where the rows have both directions and the muscle has none; not for
     the elbow's model, which has a branch of its own for lengthening.
     """
-    from pamrs.errors import RecordingError
     from pamrs.fit import fit_friction
     from pamrs.fit.remarks import friction_words
 
@@ -377,8 +375,6 @@ def _shape(context: typer.Context, inputs: _Inputs) -> tuple[dict[str, Any], lis
 
 def _inputs(context: typer.Context) -> _Inputs:
     """From a description, or from a table and the options."""
-    from pamrs.errors import ParameterError
-
     given, data = context.params, context.params["data"]
     if data.suffix.lower() == ".toml":
         beside = [
@@ -421,8 +417,6 @@ def _loops(context: typer.Context) -> ForceMap:
     """The map of hysteresis loops: friction needs the rest length alone, any other size is for the
     check of the forces.
     """
-    from pamrs.errors import ParameterError
-
     given = context.params
     sizes = {name for name in GEOMETRY if given[name] is not None}
     described = given["data"].suffix.lower() == ".toml"
@@ -438,16 +432,14 @@ def _loops(context: typer.Context) -> ForceMap:
 
 def _prior(text: str | None) -> dict[str, float]:
     """Standard deviations of moduli, ``NAME=NUMBER UNIT`` with commas between."""
-    from pamrs.errors import ParameterError
     from pamrs.fit import COEFFICIENTS
 
     known: dict[str, float] = {}
     for part in [] if text is None else text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or name not in COEFFICIENTS:
-            raise ParameterError(
-                f"--prior = {part.strip()!r} is not allowed: NAME=VALUE with a name of "
-                f"{', '.join(COEFFICIENTS)}"
+            raise refused(
+                "--prior", part.strip(), f"NAME=VALUE with a name of {', '.join(COEFFICIENTS)}"
             )
         known[name] = quantity(
             "prior",
@@ -465,17 +457,15 @@ def _noise(text: str, data: ForceMap) -> float:
 
 
 def _filter(text: str) -> tuple[str, str]:
-    from pamrs.errors import ParameterError
 
     column, equals, value = text.partition("=")
     if not (column.strip() and equals and value.strip()):
-        raise ParameterError(f"--where = {text!r} is not allowed: COLUMN=VALUE is needed")
+        raise refused("--where", text, "COLUMN=VALUE is needed")
     return column.strip(), value.strip()
 
 
 def _start(given: Mapping[str, Any]) -> tuple[Muscle, dict[str, float], Rig | None]:
     """The nominal muscle, what is known of it, and the rig that it is of."""
-    from pamrs.errors import ParameterError
     from pamrs.rig import Muscle
 
     values: dict[str, Any] = {}

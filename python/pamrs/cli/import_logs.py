@@ -13,11 +13,10 @@ import typer
 
 from pamrs._files import is_inside, resolved
 from pamrs.cli._shared import Contents, as_given, check_new, exact, progress, rig_named, write
+from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
     from pamrs.recordings import LogProposal, Proposal
-
-__all__ = ["import_command"]
 
 _MOST_STEP: Final = 86_400.0
 """Longest spacing of samples [s]."""
@@ -144,8 +143,6 @@ def _rig_beside(
 
 def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
     """Where logs that lie outside a folder are copied to; nothing is overwritten."""
-    from pamrs.errors import ParameterError
-
     if folder is None:
         raise ParameterError("copy needs a folder: give it as --out")
     targets = {path: folder / path.name for path in logs if not is_inside(folder, path)}

@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from pamrs.cli._shared import check_writable, write
+from pamrs._writing import check_writable
+from pamrs.cli._shared import write
 from pamrs.cli.completion import muscle_names
-
-__all__ = ["library_command"]
 
 
 def library_command(

@@ -7,9 +7,9 @@ from typing import Annotated, Final
 
 import typer
 
+from pamrs._writing import check_writable
 from pamrs.cli._shared import (
     as_given,
-    check_writable,
     document,
     exact,
     file_of,
@@ -17,8 +17,7 @@ from pamrs.cli._shared import (
     rig_named,
     write,
 )
-
-__all__ = ["lift_command"]
+from pamrs.errors import ParameterError
 
 SCHEMA: Final = "pamrs.lift/1"
 
@@ -48,7 +47,6 @@ def lift_command(
     """
     check_writable(png, file_of(json))
     from pamrs.design import lift
-    from pamrs.errors import ParameterError
 
     loaded = rig_named(rig)
     if payload is not None:

@@ -9,8 +9,6 @@ import typer
 
 from pamrs.cli._shared import note
 
-__all__ = ["prove_command"]
-
 INCOMPLETE: Final = 3
 """Exit code when a case could not be diagnosed."""
 

@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pamrs._checks import one_of
+from pamrs._writing import check_writable
 from pamrs.channels import channel_of, laboratory_unit
 from pamrs.cli._shared import (
-    check_writable,
     progress,
     rig_named,
     usable_samples,
     write,
 )
+from pamrs.errors import CaseError, RecordingError, SimulationError
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     from pamrs.recordings import Case, Recording
     from pamrs.rig import Rig
     from pamrs.simulation import Simulation
-
-__all__ = ["replay_command"]
 
 
 def replay_command(
@@ -76,7 +76,6 @@ def replay_command(
 def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, Rig | None]:
     """A case with its own rig, and the model beside it, if there is one."""
     from pamrs import rigs
-    from pamrs.errors import CaseError
     from pamrs.recordings import load_case, model_and_case
 
     model = None
@@ -93,20 +92,13 @@ def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, R
 
 def _chosen(case: Case, name: str) -> list[Recording]:
     """The recordings that are wanted."""
-    from pamrs.errors import ParameterError
-
-    found = [r for r in case.recordings if name in ("", r.name)]
-    if not found:
-        raise ParameterError(
-            f"--recording = {name!r} is not allowed: one of "
-            f"{', '.join(r.name for r in case.recordings)} is needed"
-        )
-    return found
+    if name:
+        one_of("--recording", name, [r.name for r in case.recordings])
+    return [r for r in case.recordings if name in ("", r.name)]
 
 
 def _run(rig: Rig, recording: Recording) -> Simulation | None:
     """A free run; None, with the reason on standard error, where the rig cannot be run so."""
-    from pamrs.errors import RecordingError, SimulationError
     from pamrs.simulation import differences, replay
 
     try:

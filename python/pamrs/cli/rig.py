@@ -9,14 +9,13 @@ import typer
 
 from pamrs import rigs
 from pamrs._files import resolved
+from pamrs._writing import write_atomically
 from pamrs.cli._shared import check_new, rig_named
 from pamrs.cli.completion import rig_names
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
-
-__all__ = ["rig_app"]
 
 rig_app = typer.Typer(help="Work with rig files.")
 
@@ -104,8 +103,6 @@ def _rig_new(
     ] = "energy_balance",
 ) -> None:
     """Write a rig file to begin with, every key explained in comments."""
-    from pamrs._writing import write_atomically
-
     file.parent.mkdir(parents=True, exist_ok=True)
     check_new(file)
     called = resolved(file).parent.name if file.stem == "rig" else file.stem

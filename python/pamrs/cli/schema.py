@@ -9,9 +9,8 @@ from typing import Annotated
 
 import typer
 
+from pamrs._writing import write_atomically
 from pamrs.cli._shared import note
-
-__all__ = ["schema_command"]
 
 
 class _What(StrEnum):
@@ -41,7 +40,6 @@ def schema_command(
     if out is None:
         typer.echo(text, nl=False)
         return
-    from pamrs._writing import write_atomically
 
     write_atomically(out, text)
     note(f"written: {out}")

@@ -9,16 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pamrs._checks import refused
+from pamrs._writing import check_writable, write_atomically
 from pamrs.channels import channel_of, dotted, laboratory_unit, unit_of
 from pamrs.cli._shared import (
     Contents,
-    check_writable,
     exact,
     progress,
     rig_named,
     usable_samples,
     write,
 )
+from pamrs.errors import ParameterError, RecordingError, meant
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -28,8 +30,6 @@ if TYPE_CHECKING:
     from pamrs.recordings import Recording
     from pamrs.rig import Rig
     from pamrs.simulation import Simulation
-
-__all__ = ["simulate_command"]
 
 _DIMENSIONS = {
     "valve_command": "voltage",
@@ -128,7 +128,6 @@ def simulate_command(
 
 def _recorded(path: Path) -> Recording:
     """A recording of inputs; what a laboratory wrote is played by another command."""
-    from pamrs.errors import RecordingError
     from pamrs.recordings import load_recording
 
     try:
@@ -163,7 +162,6 @@ def _steps(
     """Simulate under signals of steps."""
     import numpy as np
 
-    from pamrs.errors import ParameterError
     from pamrs.simulation import initial_names, input_names, simulate
 
     if not (0.0 < sample_time <= duration and duration / sample_time < 1e8):
@@ -178,7 +176,7 @@ def _steps(
         name, values = _held(text, time, known)
         head, _, block = name.partition(".")
         if (head == "length" and "length" in drive) or block in drive.get(head, {}):
-            raise ParameterError(f"--hold = {text!r} is not allowed: {name} is given twice")
+            raise refused("--hold", text, f"{name} is given twice")
         if head == "length":
             drive["length"] = values
         else:
@@ -206,31 +204,25 @@ def _held(
     """
     import numpy as np
 
-    from pamrs.errors import ParameterError, meant
-
     name, steps = _parted("hold", text, "a signal like 'valve_command = 5 V, 8 V @ 1 s'")
     same = [one for one in known if channel_of(one) == name]
     if name not in known and len(same) == 1:
         name = same[0]  # the only one is meant
     if name not in known:
         hint = f"there are: {', '.join(same)}" if same else meant(name, known)
-        raise ParameterError(
-            f"--hold = {text!r} is not allowed: the rig takes no signal {name!r}; {hint}"
-        )
+        raise refused("--hold", text, f"the rig takes no signal {name!r}; {hint}")
     dimension = _DIMENSIONS[channel_of(name)]
     values, last = np.zeros(time.size), 0.0
     for k, step in enumerate(steps.split(",")):
         value, at, when = step.partition("@")
         if (k > 0) != bool(at):
-            raise ParameterError(
-                f"--hold = {text!r} is not allowed: every value but the first needs its time, like "
-                "'8 V @ 1 s'"
+            raise refused(
+                "--hold", text, "every value but the first needs its time, like '8 V @ 1 s'"
             )
         begin = exact("hold", when, "time") if at else last
         if k > 0 and not last < begin <= time[-1]:
-            raise ParameterError(
-                f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s "
-                "(--duration) are needed"
+            raise refused(
+                "--hold", text, f"times that rise from 0 to {time[-1]:g} s (--duration) are needed"
             )
         last = begin
         values[time >= begin - 1e-9] = exact("hold", value, dimension)
@@ -239,11 +231,9 @@ def _held(
 
 def _parted(option: str, text: str, example: str) -> tuple[str, str]:
     """What stands before and behind ``=``."""
-    from pamrs.errors import ParameterError
-
     name, equals, value = text.partition("=")
     if not equals:
-        raise ParameterError(f"--{option} = {text!r} is not allowed: {example} is needed")
+        raise refused(f"--{option}", text, f"{example} is needed")
     return name.strip(), value
 
 
@@ -251,21 +241,16 @@ def _began(text: str, known: list[str]) -> tuple[str, float]:
     """An initial value from ``"muscle_pressure.elbow = 2 bar"``; ``known`` are the states that the
     rig has.
     """
-    from pamrs.errors import ParameterError, meant
-
     name, value = _parted("initial", text, "a state like 'muscle_pressure = 2 bar'")
     if name not in known:
-        raise ParameterError(
-            f"--initial = {text!r} is not allowed: the rig has no state {name!r} to begin from; "
-            f"{meant(name, known)}"
+        raise refused(
+            "--initial", text, f"the rig has no state {name!r} to begin from; {meant(name, known)}"
         )
     return name, exact("initial", value, _INITIAL[unit_of(name)])
 
 
 def _write_csv(path: Path, columns: Simulation) -> None:
     """Write channels in SI units under headers that carry the unit."""
-    from pamrs._writing import write_atomically
-
     names = list(columns)
     lines = [",".join(f"{name} [{unit_of(name)}]" for name in names)]
     for row in zip(*(columns[name].tolist() for name in names), strict=True):

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from pamrs._checks import positive, refused
+from pamrs._writing import check_writable
 from pamrs.cli._shared import (
     QUANTITY,
     as_given,
-    check_writable,
     document,
     exact,
     file_of,
@@ -20,11 +21,11 @@ from pamrs.cli._shared import (
     named_muscle,
     write,
 )
+from pamrs.errors import ParameterError
+from pamrs.units import same_dimension
 
 if TYPE_CHECKING:
     from pamrs.design.sizing import Candidate, Filling, Requirement
-
-__all__ = ["size_command"]
 
 SCHEMA: Final = "pamrs.sizing/1"
 
@@ -108,9 +109,6 @@ def size_command(
 
 def _size(name: str, text: str, dimension: str, *, zero: bool = False) -> float:
     """The same, finite and above zero, or zero where that is allowed."""
-    from pamrs._checks import positive
-    from pamrs.errors import ParameterError
-
     value = exact(name, text, dimension)
     try:
         return positive(dimension, value, zero=zero)
@@ -122,9 +120,6 @@ def _measures(text: str, unit: str) -> bool:
     """Whether a number with a unit has the dimension of ``unit``; False where it has no unit that
     is known.
     """
-    from pamrs.errors import ParameterError
-    from pamrs.units import same_dimension
-
     match = QUANTITY.match(text)
     try:
         return match is not None and same_dimension(match["unit"] or "", unit)
@@ -135,15 +130,12 @@ def _measures(text: str, unit: str) -> bool:
 def _requirement(points: Sequence[str]) -> Requirement:
     """Points ``POSITION:FORCE``; all positions are strokes, or all are contractions."""
     from pamrs.design.sizing import Requirement
-    from pamrs.errors import ParameterError
 
     pairs = []
     for text in points:
         position, colon, force = text.partition(":")
         if not colon:
-            raise ParameterError(
-                f"--point = {text!r} is not allowed: POSITION:FORCE is needed, like '30 mm:7 kN'"
-            )
+            raise refused("--point", text, "POSITION:FORCE is needed, like '30 mm:7 kN'")
         pairs.append((position, force))
     kind = "contraction" if _measures(pairs[0][0], "1") else "stroke"
     if any(_measures(position, "1") != (kind == "contraction") for position, _ in pairs):
@@ -181,7 +173,6 @@ def _candidate(name: str, pressure: float | None) -> Candidate:
     """A muscle of the library, or of a rig file."""
     from pamrs import library
     from pamrs.design.sizing import Candidate
-    from pamrs.errors import ParameterError
 
     if name in library.names():
         return Candidate.from_library(name, pressure=pressure)

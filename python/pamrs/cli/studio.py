@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from pamrs.cli._shared import note
-
-__all__ = ["studio_command"]
+from pamrs.errors import missing_package
 
 
 def studio_command(
@@ -30,8 +29,6 @@ def studio_command(
 
     It answers on this computer alone, to who has its address. Ctrl-C ends it.
     """
-    from pamrs.errors import missing_package
-
     try:
         from pamrs.studio import Studio, serve
     except ImportError as error:

@@ -24,12 +24,12 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from pamrs._checks import one_of
+from pamrs._checks import one_of, refused
 from pamrs.control._model import JointModel
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed
 from pamrs.control._sliding import SlidingController
-from pamrs.control._values import as_value, clip
+from pamrs.control._values import as_value, clip, gains_of
 from pamrs.errors import ParameterError
 
 _NAMES: Final = ("inertia", "viscous", "weight")
@@ -97,14 +97,7 @@ class AdaptiveSliding(SlidingController):
         hold_at_limit: bool = True,
         **others: Any,
     ) -> None:
-        if len(gains) != 3:
-            raise ParameterError(
-                f"gains has {len(gains)} entries: three are needed, for I, b and m g r"
-            )
-        pairs = zip(_NAMES, gains, strict=True)
-        self._gains: tuple[Value, ...] = tuple(
-            as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs
-        )
+        self._gains = gains_of(_NAMES, gains)
         self._deadband = as_value("deadband", deadband, lower=0.0)
         self.hold_at_limit = bool(hold_at_limit)
         self._parameters = arm.parameters
@@ -242,9 +235,7 @@ def _bounds(
     for parameter, pair in zip(parameters, pairs, strict=True):
         low, high, start = float(pair[0]), float(pair[1]), np.asarray(parameter.value)
         if not (low < high and np.all(start >= low) and np.all(start <= high)):
-            raise ParameterError(
-                f"bounds[{parameter.name}] = {(low, high)} is not allowed: rising, with the start "
-                f"{start.tolist()} within"
-            )
+            needed = f"rising, with the start {start.tolist()} within"
+            raise refused(f"bounds[{parameter.name}]", (low, high), needed)
         checked.append((low, high))
     return tuple(checked)

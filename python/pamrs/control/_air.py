@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.control._groups import Group, groups_of, named
+from pamrs.channels import dotted
+from pamrs.control._groups import Group, check_single, groups_of
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
 from pamrs.control._torque import _parts
@@ -25,9 +26,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_LAMINAR: Final = (
-    0.999  # pressure ratio above which the orifice law is a line (physics reference, section 3)
-)
+# pressure ratio above which the orifice law is a line (physics reference, section 3)
+_LAMINAR: Final = 0.999
 _WAYS: Final = ("fill", "vent")
 _LEAST_FLOW: Final = 1e-12  # of the choked one: nothing flows, and any area is as good
 
@@ -192,7 +192,7 @@ class AirModel:
             )
             volume = volume + int(muscle.parameters["count"]) * muscle.air_volume(contraction)
         self.volume = Spline(low, high, volume)
-        self._fill, self._vent = _paths(rig.name, named("valve", group.feed.name), valve, gas)
+        self._fill, self._vent = _paths(rig.name, dotted("valve", group.feed.name), valve, gas)
         self.null, self.half_range = float(valve["null_voltage"]), float(valve["half_range"])
         self._fraction, self._opening = _inverse(valve)
 
@@ -313,12 +313,8 @@ def _group(rig: Rig, chamber: str | None) -> Group:
     """The muscles of a chamber that a valve feeds from a supply."""
     groups = groups_of(rig)
     if chamber is None:
-        for block in ("valve", "chamber", "supply"):
-            if len(rig.tables(block)) != 1:
-                raise ParameterError(
-                    f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's "
-                    "model needs exactly one, or the name of a chamber"
-                )
+        needed = "needs exactly one, or the name of a chamber"
+        check_single(rig, ("valve", "chamber", "supply"), needed)
     found = [group for group in groups if chamber in (None, group.chamber)]
     if not found:
         there = ", ".join(repr(group.chamber) for group in groups) or "none"

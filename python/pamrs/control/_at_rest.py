@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from pamrs._checks import refused
 from pamrs.channels import dotted
 from pamrs.control._groups import lengths_of
 from pamrs.effects import EFFECTS
@@ -25,6 +26,12 @@ SAMPLE: Final = 2.5e-4
 #: tenth of a second, the time of a loop, it moves a ten-thousandth of its range by such an
 #: acceleration. Of a joint of 115 deg 1e-5 rad/s, of a stroke of 0.1 m 5e-7 m/s.
 _REST: Final = 5e-6
+#: Keys of a regulator that has no linear model, and why.
+_DEAD: Final = {
+    "dead_time": "it is no state of a linear model; set it to 0, and give it as the delay of the "
+    "loop",
+    "dead_band": "inside its band it does not answer; hold supply_pressure",
+}
 
 
 def check_smooth(rig: Rig, *, supplies: bool) -> None:
@@ -44,18 +51,9 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
         With the name of the effect, of the dead time or dead band, or of a valve that switches.
     """
     for name, table in rig.tables("supply").items():
-        late = table.get("dead_time", 0.0)
-        if supplies and late > 0.0:
-            raise ParameterError(
-                f"{qualified('supply', name)}.dead_time = {late:g} is not allowed: it is no state "
-                "of a linear model; set it to 0, and give it as the delay of the loop"
-            )
-        band = table.get("dead_band", 0.0)
-        if supplies and band > 0.0:
-            raise ParameterError(
-                f"{qualified('supply', name)}.dead_band = {band:g} is not allowed: inside its band "
-                "it does not answer; hold supply_pressure"
-            )
+        for key, why in _DEAD.items():
+            if supplies and (value := table.get(key, 0.0)) > 0.0:
+                raise refused(f"{qualified('supply', name)}.{key}", value, why)
     for name, table in rig.tables("valve").items():
         if table["spool"] == "switching":
             raise ParameterError(

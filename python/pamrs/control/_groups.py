@@ -6,15 +6,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from pamrs.channels import dotted
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
 
-def named(word: str, name: str) -> str:
-    """A channel, or a block in full: the bare word for a block without a name."""
-    return f"{word}.{name}" if name else word
+def check_single(rig: Rig, blocks: tuple[str, ...], needed: str) -> None:
+    """Refuse a rig with none or several of a kind of block."""
+    for block in blocks:
+        if (count := len(rig.tables(block))) != 1:
+            raise ParameterError(
+                f"rig {rig.name!r} has {count} [{block}]: a controller's model {needed}"
+            )
 
 
 def beyond_sine(rig: Rig, joint: str) -> tuple[str, ...]:
@@ -25,7 +30,7 @@ def beyond_sine(rig: Rig, joint: str) -> tuple[str, ...]:
         return ("load.kind = 'mass', whose weight is the same everywhere",)
     arm, own = next(iter(rig.tables("arm").values())), rig.tables("joint")[joint]
     found = [("arm", arm, key, "rad") for key in ("base_angle", "centre_angle")]
-    found.append((named("joint", joint), own, "stiffness", "N m/rad"))
+    found.append((dotted("joint", joint), own, "stiffness", "N m/rad"))
     return tuple(
         f"{block}.{key} = {table[key]:g} {unit}"
         for block, table, key, unit in found
@@ -94,7 +99,7 @@ def joints_of(rig: Rig) -> tuple[str, ...]:
     for name, load in rig.tables("load").items():
         if load.get("kind", "mass") == "frame":
             raise ParameterError(
-                f"rig {rig.name!r}: [{named('load', name)}] is a frame, which prescribes the "
+                f"rig {rig.name!r}: [{dotted('load', name)}] is a frame, which prescribes the "
                 "length of the muscles, so that no controller moves them: follow a force by a "
                 "pressure (pamrs.control.torque_line has it, a line in the pressure), or take a "
                 "load of kind 'mass'"
@@ -157,7 +162,7 @@ def groups_of(rig: Rig) -> tuple[Group, ...]:
         turned = {muscles[name][1] for name in here}
         if len(turned) > 1:
             raise ParameterError(
-                f"rig {rig.name!r}: the muscles of {named('chamber', chamber)} turn the joints "
+                f"rig {rig.name!r}: the muscles of {dotted('chamber', chamber)} turn the joints "
                 f"{', '.join(sorted(turned))}; a controller's model needs a chamber for each"
             )
         if here:
@@ -180,12 +185,12 @@ def direct_regulators(rig: Rig) -> tuple[str, ...]:
     pulling = {ports["chamber"] for ports in rig.ports("muscle").values()}
     lines = rig.ports("line")
     ways = [
-        {ports["from"], ports["to"], named("line", name)} - {""} for name, ports in lines.items()
+        {ports["from"], ports["to"], dotted("line", name)} - {""} for name, ports in lines.items()
     ]
     taken = {ports["from"] for ports in rig.ports("valve").values()}
     found = []
     for name, table in rig.tables("supply").items():
-        reached, new = set(), {named("supply", name)}
+        reached, new = set(), {dotted("supply", name)}
         while new:
             reached |= new
             here = new - pulling
@@ -235,7 +240,7 @@ def _feed(
     supplies: Mapping[str, Mapping[str, Any]],
 ) -> Feed:
     """What lies up the way of the air, through lines, from a chamber of a rig."""
-    here, passed = named("chamber", chamber), set()
+    here, passed = dotted("chamber", chamber), set()
     while here not in passed:
         passed.add(here)
         fed = [(name, ports) for name, ports in valves.items() if ports["to"] == here]
@@ -247,20 +252,20 @@ def _feed(
         if fed:
             return Feed("valve_command", fed[0][0], *_behind(fed[0][1]["from"], lines))
         before = [ports["from"] for ports in lines.values() if ports["to"] == here]
-        before += [named("line", name) for name, ports in lines.items() if ports["to"] == here]
+        before += [dotted("line", name) for name, ports in lines.items() if ports["to"] == here]
         places = [place for place in before if place and place not in passed]
         supplied = [place for place in places if place.partition(".")[0] == "supply"]
         if supplied:
             name = _short(supplied[0])
             if supplies[name].get("kind") != "regulator":
                 break
-            return Feed("supply_command", name, name, named("supply_pressure", name))
+            return Feed("supply_command", name, name, dotted("supply_pressure", name))
         if not places:
             return Feed("pressure", chamber, None)
         here = places[-1]
     raise ParameterError(
-        f"rig {rig!r}: nothing that can be commanded feeds {named('chamber', chamber)}; a valve or "
-        "a regulator is needed"
+        f"rig {rig!r}: nothing that can be commanded feeds {dotted('chamber', chamber)}; a valve "
+        "or a regulator is needed"
     )
 
 
@@ -270,7 +275,7 @@ def _behind(place: str, lines: Mapping[str, Mapping[str, str]]) -> tuple[str | N
     """
     block, name = place.partition(".")[0], _short(place)
     if block == "supply":
-        return name, named("supply_pressure", name)
+        return name, dotted("supply_pressure", name)
     here, passed = place, set()
     while here not in passed:
         passed.add(here)
@@ -279,5 +284,5 @@ def _behind(place: str, lines: Mapping[str, Mapping[str, str]]) -> tuple[str | N
                 here = ports["from"]
                 break
         if here.partition(".")[0] == "supply":
-            return _short(here), named("muscle_pressure", name)
+            return _short(here), dotted("muscle_pressure", name)
     return None, None

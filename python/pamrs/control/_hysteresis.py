@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
-from pamrs._checks import one_of, positive
+from pamrs._checks import one_of, positive, refused
 from pamrs.control._protocol import Controller, Measurement, Reference, Value, check_drives_valve
 from pamrs.control._sampled import Restorer, SampledController, Stateful
 from pamrs.control._spline import Spline
@@ -240,7 +240,7 @@ class DeadZoneCompensation(SampledController):
                 "on one is needed"
             )
         if not 0.0 < blend < 1.0:
-            raise ParameterError(f"blend = {blend} is not allowed: above 0 and below 1")
+            raise refused("blend", blend, "above 0 and below 1")
         self.controller, self.blend = controller, float(blend)
         self.half_width = float(found[0]["parameters"]["half_width"])
         valve = next(iter(valves.values()))

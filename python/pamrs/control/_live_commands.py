@@ -9,7 +9,7 @@ import numbers
 from collections.abc import Mapping
 from typing import Any, Final, TypeAlias
 
-from pamrs._checks import rising
+from pamrs._checks import refused, rising
 from pamrs.channels import channel_of
 from pamrs.control._protocol import Controller, check_drives_valve, commands_of
 from pamrs.errors import ParameterError
@@ -134,16 +134,17 @@ class LiveCommands:
     @staticmethod
     def _number(label: str, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
-            raise ParameterError(f"{label} = {value!r} is not allowed: a number is needed")
+            raise refused(label, value, "a number is needed")
         return float(value)
 
 
 def _ranges_of_safe(controller: Controller, safe: Any) -> dict[str, tuple[float, float, float]]:
     """Commands of a controller that does not say them: those that have a safe value."""
     if not isinstance(safe, Mapping) or not safe:
-        raise ParameterError(
-            f"safe = {safe!r} is not allowed: a {type(controller).__name__} answers every input of "
-            "a rig and does not say which (command_ranges); a mapping of every command to its safe "
-            "value is needed"
+        raise refused(
+            "safe",
+            safe,
+            f"a {type(controller).__name__} answers every input of a rig and does not say which "
+            "(command_ranges); a mapping of every command to its safe value is needed",
         )
     return {str(name): (0.0, -math.inf, math.inf) for name in safe}

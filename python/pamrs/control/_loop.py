@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import finite, one_of, quantities
+from pamrs._checks import check_names, finite, one_of, quantities
 from pamrs._tables import Columns, Tabular
 from pamrs._tables import over_time as columns_over_time
 from pamrs._views import Curve, Panels, View, in_laboratory_units, over_time
@@ -251,9 +251,8 @@ def closed_loop(
     )
     finite("start", start)
     act = actuation_of(simulator.rig, controller) if actuation is None else actuation
-    began = (
-        round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt
-    )  # a restart at the same float
+    # a restart at the same float
+    began = round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt
     alias = measured_by(controller, measured)
     tracked = _angles(simulator.rig, controller, alias)
     by_length = tracked[0] == "length"
@@ -422,12 +421,7 @@ def _recorded(rig: Rig, channels: Iterable[str] | None, tracked: Iterable[str]) 
     if channels is None:
         return known
     wanted = list(dict.fromkeys([*tracked, *channels]))
-    for name in wanted:
-        if name not in known:
-            raise ParameterError(
-                f"channels has {name!r}, and the rig has no such channel; it has: "
-                f"{', '.join(known)}"
-            )
+    check_names("channels", wanted, known)
     return wanted
 
 
@@ -450,12 +444,7 @@ def tracked_of(rig: Rig, measured: Mapping[str, str] | None) -> tuple[str, str]:
         If a channel is not known, or there is no such joint.
     """
     known = core_rig(rig).channels
-    for name in (measured or {}).values():
-        if name not in known:
-            raise ParameterError(
-                f"measured has {name!r}, and the rig has no such channel; it has: "
-                f"{', '.join(known)}"
-            )
+    check_names("measured", (measured or {}).values(), known)
     angle = (measured or {}).get("joint_angle", "joint_angle")
     if angle not in known:
         raise ParameterError(

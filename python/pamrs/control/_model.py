@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from pamrs._checks import finite, rising
+from pamrs._checks import finite, refused, rising
 from pamrs.control._groups import highest_pressure, joints_of
 from pamrs.control._protocol import Value
 from pamrs.control._torque import TorqueModel, active_groups, joint_torque
@@ -174,10 +174,8 @@ class ArmModel(JointModel):
         rising("angle_range", self.angle_range)
         stiffness, rest = (float(value) for value in self.spring)
         if not (math.isfinite(stiffness) and math.isfinite(rest) and stiffness >= 0.0):
-            raise ParameterError(
-                f"spring = {self.spring} is not allowed: a finite stiffness of zero or more "
-                "[N m/rad] and a finite angle [rad]"
-            )
+            needed = "a finite stiffness of zero or more [N m/rad] and a finite angle [rad]"
+            raise refused("spring", self.spring, needed)
         finite("tilt", self.tilt)
 
     @classmethod

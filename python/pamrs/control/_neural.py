@@ -25,14 +25,14 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import one_of, whole
+from pamrs._checks import one_of, refused, whole
 from pamrs._writing import write_atomically
 from pamrs.control._adaptive import dead, held
 from pamrs.control._model import JointModel
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed
 from pamrs.control._sliding import SlidingController
-from pamrs.control._values import as_value, clip
+from pamrs.control._values import as_value, clip, gains_of
 from pamrs.errors import ParameterError
 
 Array = NDArray[np.float64]
@@ -110,14 +110,7 @@ class Neural(SlidingController):
     ) -> None:
         one_of("start", start, ("zero", "model"))
         whole("nodes", nodes, 2, 10_000)
-        if len(gains) != 3:
-            raise ParameterError(
-                f"gains has {len(gains)} entries: three are needed, for H, C and G"
-            )
-        pairs = zip(NETWORKS, gains, strict=True)
-        self._gains: tuple[Value, ...] = tuple(
-            as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs
-        )
+        self._gains = gains_of(NETWORKS, gains)
         self._deadband, self._nodes = as_value("deadband", deadband, lower=0.0), nodes
         self.hold_at_limit = bool(hold_at_limit)
         limit = arm.pressure_limit
@@ -125,9 +118,7 @@ class Neural(SlidingController):
         if chosen is not None and not (
             len(chosen) == 3 and all(isinstance(b, (int, float)) and b > 0.0 for b in chosen)
         ):
-            raise ParameterError(
-                f"bounds = {bounds!r} is not allowed: 'default', three numbers above zero or None"
-            )
+            raise refused("bounds", bounds, "'default', three numbers above zero or None")
         self._bounds: tuple[float, ...] | None = (
             None if chosen is None else tuple(float(b) for b in chosen)
         )
@@ -195,11 +186,9 @@ class Neural(SlidingController):
 
     def _start(self) -> dict[str, Any]:
         # of several joints they become arrays with the first sample, which says of how many plants
-        return (
-            {name: list(weights) for name, weights in self._initial.items()}
-            if self._single
-            else dict.fromkeys(NETWORKS)
-        )
+        if self._single:
+            return {name: list(weights) for name, weights in self._initial.items()}
+        return dict.fromkeys(NETWORKS)
 
     def _row_shape(self, name: str, start: Any) -> tuple[int, ...]:
         return (self._nodes,)

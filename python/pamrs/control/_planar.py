@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import finite
+from pamrs._checks import finite, refused
 from pamrs.control._groups import highest_pressure, joints_of
 from pamrs.control._model import JointModel, Parameter
 from pamrs.control._protocol import Value
@@ -128,10 +128,8 @@ class PlanarArmModel(JointModel):
             both = np.concatenate([stiffness.ravel(), rest.ravel()])
             right = stiffness.shape == rest.shape == (n,) and bool(np.all(np.isfinite(both)))
             if not (right and np.all(stiffness >= 0.0)):
-                raise ParameterError(
-                    f"spring = {self.spring} is not allowed: finite stiffnesses of zero or more "
-                    f"and finite angles are needed for the joints {', '.join(self.names)}"
-                )
+                needed = "finite stiffnesses of zero or more and finite angles are needed for the "
+                raise refused("spring", self.spring, f"{needed}joints {', '.join(self.names)}")
             stiffness.flags.writeable = rest.flags.writeable = False
             object.__setattr__(self, "spring", (stiffness, rest))
         object.__setattr__(

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import check_kind, refused
 from pamrs.channels import dotted
 from pamrs.errors import ParameterError
 
@@ -123,16 +124,10 @@ def check_controller(controller: Any) -> None:
     ParameterError
         If it is no controller, or its period is not above zero.
     """
-    if not isinstance(controller, Controller):
-        raise ParameterError(
-            f"controller is a {type(controller).__name__}; a pamrs.control.Controller is needed"
-        )
+    check_kind("controller", controller, Controller, "a pamrs.control.Controller")
     period = getattr(controller, "period", math.nan)
     if not (isinstance(period, (int, float, np.number)) and math.isfinite(period) and period > 0.0):
-        raise ParameterError(
-            f"controller.period = {period!r} is not allowed: a number of seconds above zero is "
-            "needed"
-        )
+        raise refused("controller.period", period, "a number of seconds above zero is needed")
 
 
 def check_drives_valve(controller: Controller) -> None:

@@ -18,10 +18,11 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs.channels import unit_of
+from pamrs._checks import check_names, one_of, refused
+from pamrs.channels import dotted, unit_of
 from pamrs.control._air import AirModel
 from pamrs.control._at_rest import SAMPLE, after, closed, kept, resting, slowest
-from pamrs.control._groups import Group, lengths_of, named
+from pamrs.control._groups import Group, lengths_of
 from pamrs.control._load import shortened
 from pamrs.control._protocol import (
     Controller,
@@ -78,10 +79,8 @@ class _Law(Stateful):
         plants = 1 if batch is None else batch
         allowed = (None, batch) if self.joints == 1 else (None, self.joints * plants)
         if batch != -1 and own not in allowed:
-            raise ParameterError(
-                f"{where}.batch = {own!r} is not allowed: {self.joints * plants} rows are needed "
-                f"for {self.joints} joints of {plants} plants"
-            )
+            rows = f"{self.joints * plants} rows are needed for {self.joints} joints"
+            raise refused(f"{where}.batch", own, f"{rows} of {plants} plants")
 
 
 class _Named(Stateful):
@@ -166,7 +165,7 @@ class RigController(SampledController):
         self.law = _Law(law, len(model.joints))
         self._commanded = getattr(law, "motion", "measured") == "commanded"
         given = {model.joints[0]: shares} if isinstance(shares, Share) else dict(shares or {})
-        self._check_names("shares", given, model.joints)
+        check_names("shares", given, model.joints)
         self._shares = [self._share(name, given.get(name), stiffness) for name in model.joints]
         self.shares = _Named(dict(zip(model.joints, self._shares, strict=True)))
         chosen = ("flow" if self._commanded else "loop") if air is None else air
@@ -197,31 +196,23 @@ class RigController(SampledController):
 
     # ------------------------------------------------------------------ made
 
-    @staticmethod
-    def _check_names(what: str, given: Mapping[str, Any], known: Sequence[str]) -> None:
-        for name in given:
-            if name not in known:
-                raise ParameterError(
-                    f"{what} has {name!r}; the rig has {', '.join(map(repr, known))}"
-                )
-
     def _share(self, joint: str, given: Share | None, stiffness: Any) -> Share:
         if isinstance(stiffness, Mapping):
-            self._check_names("stiffness", stiffness, self.joints)
+            check_names("stiffness", stiffness, self.joints)
             stiffness = stiffness.get(joint)
         torques, limit = self.model.torques_of(joint), self.model.pressure_limit
         if given is not None:
             if len(given.groups) != len(torques):
                 raise ParameterError(
-                    f"the share of {named('joint', joint)} is for {len(given.groups)} groups; the "
-                    f"joint has {len(torques)}"
+                    f"the share of {dotted('joint', joint)} is for {len(given.groups)} groups; "
+                    f"the joint has {len(torques)}"
                 )
             return given
         if self.model.opposed(joint):
             return CoContraction(torques, limit, stiffness=stiffness)
         if stiffness is not None:
             raise ParameterError(
-                f"stiffness is given for {named('joint', joint)}, whose muscles are all on one "
+                f"stiffness is given for {dotted('joint', joint)}, whose muscles are all on one "
                 "side: it follows from the torque"
             )
         return Together(torques, limit)
@@ -231,14 +222,11 @@ class RigController(SampledController):
     ) -> Any:
         model, feed = self.model, group.feed
         if isinstance(chosen, Mapping):
-            self._check_names("air", chosen, [g.chamber for g in model.groups])
+            check_names("air", chosen, [g.chamber for g in model.groups])
             if group.chamber in chosen:
                 return chosen[group.chamber]
             chosen = "flow" if self._commanded else "loop"
-        if chosen not in ("loop", "flow"):
-            raise ParameterError(
-                f"air = {chosen!r} is not allowed: 'loop', 'flow' or a way for each chamber"
-            )
+        one_of("air", chosen, ("loop", "flow"), also=", or a way for each chamber")
         if feed.input != "valve_command":
             if lead == "lag":
                 supply = model.rig.tables("supply").get(feed.supply or "", {})
@@ -250,11 +238,11 @@ class RigController(SampledController):
 
     def _named_channels(self) -> tuple[list[str], list[str], list[str], list[str | None]]:
         model = self.model
-        angles = [named("joint_angle", name) for name in model.joints]
-        rates = [named("joint_rate", name) for name in model.joints]
+        angles = [dotted("joint_angle", name) for name in model.joints]
+        rates = [dotted("joint_rate", name) for name in model.joints]
         if self._rest_length is not None:
             angles, rates = ["length"], ["length_rate"]
-        pressures = [named("muscle_pressure", group.chamber) for group in model.groups]
+        pressures = [dotted("muscle_pressure", group.chamber) for group in model.groups]
         supplies = [group.feed.source for group in model.groups]
         return angles, rates, pressures, supplies
 
@@ -271,7 +259,7 @@ class RigController(SampledController):
                 valve = self.model.rig.tables("valve")[group.feed.name]
                 rest, half = float(valve["null_voltage"]), float(valve["half_range"])
                 low, high = rest - half, rest + half
-            found[named(group.feed.input, group.feed.name)] = (rest, low, high)
+            found[dotted(group.feed.input, group.feed.name)] = (rest, low, high)
         return found
 
     # ------------------------------------------------------------------ used
@@ -469,9 +457,7 @@ class RigController(SampledController):
             )
             what = "angle" if rest_length is None else "length"
             at_given = np.asarray(angle).tolist()
-            raise ParameterError(
-                f"{what} = {at_given} is not allowed: one number each is needed, {ends}"
-            )
+            raise refused(what, at_given, f"one number each is needed, {ends}")
         return float(at.ravel()[0]) if joints == 1 else at.ravel()
 
     def _check_drive(self, drive: Value, rows: Value, angle: ArrayLike) -> None:
@@ -501,9 +487,9 @@ class RigController(SampledController):
         start = dict(zip(self.tracked, np.ravel(angle).astype(float).tolist(), strict=True))
         for group in self.model.groups:
             pressure = float(pressures[group.chamber])
-            start[named("muscle_pressure", group.chamber)] = pressure
+            start[dotted("muscle_pressure", group.chamber)] = pressure
             if group.feed.input == "supply_command":
-                start[named("supply_pressure", group.feed.name)] = pressure
+                start[dotted("supply_pressure", group.feed.name)] = pressure
             start |= {name: pressure for name in self._lines_to(group.chamber)}
         return start
 
@@ -516,8 +502,8 @@ class RigController(SampledController):
         commands = {**closed(rig), **kept(rig, simulator.observe())}
         for group in (*self.model.groups, *self.model.vented):
             if group.feed.input == "pressure":
-                pressure = named("muscle_pressure", group.chamber)
-                commands[named("pressure", group.chamber)] = start.get(pressure, 0.0)
+                pressure = dotted("muscle_pressure", group.chamber)
+                commands[dotted("pressure", group.chamber)] = start.get(pressure, 0.0)
         rates, limits = after(simulator, commands), slowest(rig)
         names = self._channels[1]
         sense = 1.0 if self._rest_length is None else -1.0
@@ -526,13 +512,13 @@ class RigController(SampledController):
     def _lines_to(self, chamber: str) -> list[str]:
         """Names of the pressures in lines that end in a chamber."""
         rig = self.model.rig
-        known, place = core_rig(rig).states, named("chamber", chamber)
+        known, place = core_rig(rig).states, dotted("chamber", chamber)
         lines = [name for name, ports in rig.ports("line").items() if ports["to"] == place]
-        return [name for name in (named("line_pressure", n) for n in lines) if name in known]
+        return [name for name in (dotted("line_pressure", n) for n in lines) if name in known]
 
     def _opened(self, group: Group) -> float:
         """The command that opens a group to the ambient: the lowest one."""
-        return self.command_ranges[named(group.feed.input, group.feed.name)][1]
+        return self.command_ranges[dotted(group.feed.input, group.feed.name)][1]
 
     @staticmethod
     def _answer(answers: dict[str, Any], group: Group, command: Value) -> None:

@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pamrs._checks import refused
 from pamrs.control._protocol import Controller, Measurement, Reference, Value
 from pamrs.control._values import as_value, positive_number
 from pamrs.errors import ParameterError
@@ -114,9 +115,7 @@ class Stateful:
             except ValueError:  # rows of different lengths
                 array = np.empty(0, dtype=np.object_)
             if array.dtype.kind not in "iuf":
-                raise ParameterError(
-                    f"{where}.{name} = {state[name]!r} is not allowed: numbers are needed"
-                )
+                raise refused(f"{where}.{name}", state[name], "numbers are needed")
             if not np.all(np.isfinite(array)):
                 raise ParameterError(f"{where}.{name} is not finite")
             shape = self._row_shape(name, start)
@@ -285,18 +284,12 @@ class SampledController(Stateful, Controller):
             )
         time, own = state["time"], state["batch"]
         if time is not None and not (_is(time, numbers.Real) and math.isfinite(time)):
-            raise ParameterError(
-                f"{where}.time = {time!r} is not allowed: a finite number or None is needed"
-            )
+            raise refused(f"{where}.time", time, "a finite number or None is needed")
         if own is not None and not (_is(own, numbers.Integral) and own >= 1):
-            raise ParameterError(
-                f"{where}.batch = {own!r} is not allowed: a whole number from 1 on or None is "
-                "needed"
-            )
+            raise refused(f"{where}.batch", own, "a whole number from 1 on or None is needed")
         if self._gain_batch is not None and own != self._gain_batch:
-            raise ParameterError(
-                f"{where}.batch = {own!r} is not allowed: the gains are those of a batch of "
-                f"{self._gain_batch}"
+            raise refused(
+                f"{where}.batch", own, f"the gains are those of a batch of {self._gain_batch}"
             )
         super()._check_state(
             {name: value for name, value in state.items() if name not in ("time", "batch")},
@@ -361,11 +354,9 @@ class SampledController(Stateful, Controller):
         if angle.__class__ is float and rate.__class__ is float and acceleration.__class__ is float:
             total = angle + rate + acceleration
             if total - total == 0.0:
-                return (
-                    reference
-                    if reference.__class__ is Reference
-                    else Reference(angle, rate, acceleration)
-                )
+                if reference.__class__ is Reference:
+                    return reference
+                return Reference(angle, rate, acceleration)
         return Reference(
             *(
                 self._sized(f"reference.{name}", value)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pamrs._checks import checked_table, positive, whole
+from pamrs._checks import check_kind, check_names, checked_table, positive, whole
 from pamrs.control._protocol import Measurement, Value
 from pamrs.errors import ParameterError
 
@@ -171,11 +171,7 @@ class Reader:
 
 
 def _there(sample: Measurement, channel: str) -> Value:
-    if channel not in sample:
-        raise ParameterError(
-            f"sensors have {channel!r}, and the plant has no such channel; it has: "
-            f"{', '.join(sample)}"
-        )
+    check_names("sensors", [channel], sample)
     return sample[channel]
 
 
@@ -201,10 +197,7 @@ def reader_of(sensors: Sensors | Reader | None, period: float) -> Reader | None:
     """
     if sensors is None or isinstance(sensors, Sensors):
         return None if sensors is None else sensors.started(period)
-    if not isinstance(sensors, Reader):
-        raise ParameterError(
-            f"sensors is a {type(sensors).__name__}; Sensors, or a Reader that goes on, are needed"
-        )
+    check_kind("sensors", sensors, Reader, "Sensors, or a Reader that goes on,")
     if sensors.period != period:
         raise ParameterError(
             f"sensors are read every {sensors.period:g} s, the controller's period is {period:g} "

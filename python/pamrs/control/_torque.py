@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control._groups import Group, beyond_sine, groups_of, highest_pressure, named
+from pamrs._checks import check_names, one_of
+from pamrs.channels import dotted
+from pamrs.control._groups import Group, beyond_sine, check_single, groups_of, highest_pressure
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
 from pamrs.control._values import clip, positive_gain, where
@@ -26,9 +28,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_NODES: Final = (
-    1025  # of a table over the joint's range; makes its error some 1e-9 of the largest value
-)
+# of a table over the joint's range; makes its error some 1e-9 of the largest value
+_NODES: Final = 1025
 _STRUT: Final = 1e9  # buckling load of a muscle that pushes, whatever it is pushed with [N]
 _LEAST_SLOPE: Final = 0.01  # of the largest C1: below it a pressure says nothing about the torque
 _INCH: Final = 0.0254
@@ -90,12 +91,7 @@ def _parts(rig: Rig, muscle: str | None = None) -> tuple[Muscle, Any, dict[str, 
         ends = {"min_angle": rest - load["max_length"], "max_angle": rest - load["min_length"]}
         return rig.muscle_of(muscle), _Straight(), ends
     if muscle is None:
-        for block in ("muscle", "joint", "arm"):
-            if len(rig.tables(block)) != 1:
-                raise ParameterError(
-                    f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's "
-                    "model of one muscle needs exactly one"
-                )
+        check_single(rig, ("muscle", "joint", "arm"), "of one muscle needs exactly one")
         arm = next(iter(rig.tables("arm").values()))
         if arm["kind"] != "one_link":
             raise ParameterError(
@@ -502,12 +498,7 @@ def active_groups(rig: Rig, active: Sequence[str] | None) -> tuple[Group, ...]:
     if active is None:
         return groups
     there = [group.chamber for group in groups]
-    for name in active:
-        if name not in there:
-            raise ParameterError(
-                f"active has {name!r}, and rig {rig.name!r} has no such chamber with muscles; it "
-                f"has: {', '.join(map(repr, there))}"
-            )
+    check_names("active", active, there)
     return tuple(group for group in groups if group.chamber in active)
 
 
@@ -576,10 +567,8 @@ def joint_torque(
         "simplified": SimplifiedTorque.fit,
         "gaylord": GaylordTorque,
     }
-    if isinstance(torque, str) and torque not in makers:
-        raise ParameterError(
-            f"torque = {torque!r} is not allowed: one of {', '.join(makers)}, or a model"
-        )
+    if isinstance(torque, str):
+        one_of("torque", torque, makers, also=", or a model")
     alone = whole and len(rig.tables("muscle")) == len(rig.tables("joint")) == 1
     if alone:
         chosen: TorqueModel = makers[torque](rig) if isinstance(torque, str) else torque
@@ -591,7 +580,7 @@ def joint_torque(
         )
     each = tuple(group_torques(rig, [g for g in groups if g.joint == joint]).values())
     if all(group.sign < 0 for group in each):
-        where = named("joint", joint)
+        where = dotted("joint", joint)
         raise ParameterError(
             f"rig {rig.name!r}: no muscle in use raises the angle of {where}, so that no pressure "
             "can be asked for"

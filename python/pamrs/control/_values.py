@@ -5,11 +5,12 @@ floats.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from pamrs._checks import checked_number, one_of, rising
+from pamrs._checks import checked_number, one_of, refused, rising
 from pamrs.control._protocol import Value
 from pamrs.errors import ParameterError
 
@@ -46,9 +47,7 @@ def as_value(
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ParameterError(
-            f"{name} = {value!r} is not allowed: a number or an array of shape (n,) is needed"
-        ) from None
+        raise refused(name, value, "a number or an array of shape (n,) is needed") from None
     if array.ndim > 1 or array.size == 0:
         raise ParameterError(
             f"{name} has shape {array.shape}: a number or an array of shape (n,) is needed"
@@ -59,11 +58,9 @@ def as_value(
     if np.any(wrong):
         first = np.atleast_1d(array)[np.atleast_1d(wrong)][0]
         bound = f"above {lower:g}" if above else f"from {lower:g}"
-        allowed = (
-            "finite"
-            if lower == -math.inf and upper == math.inf
-            else f"finite, {bound} to {upper:g}"
-        )
+        allowed = "finite"
+        if lower > -math.inf or upper < math.inf:
+            allowed = f"finite, {bound} to {upper:g}"
         raise ParameterError(f"{name} = {first:g} is not allowed: {allowed} is needed")
     if array.ndim == 0:
         return float(array)
@@ -71,6 +68,16 @@ def as_value(
     kept = array.copy()
     kept.flags.writeable = False
     return kept
+
+
+def gains_of(names: Sequence[str], gains: Sequence[Any]) -> tuple[Value, ...]:
+    """A gain from zero on for each of some names, see :func:`as_value`."""
+    if len(gains) != len(names):
+        raise ParameterError(
+            f"gains has {len(gains)} entries: {len(names)} are needed, for {', '.join(names)}"
+        )
+    pairs = zip(names, gains, strict=True)
+    return tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
 
 
 def positive_gain(name: str, value: Any) -> Value:

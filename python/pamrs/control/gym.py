@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import one_of, positive, whole
+from pamrs._checks import one_of, positive, refused, whole
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.control._groups import direct_regulators, lengths_of
 from pamrs.control._protocol import keywords_of
@@ -157,10 +157,8 @@ class _Task:
             reach = one.high - one.low
             low, high = (one.low + 0.2 * reach, one.low + 0.6 * reach) if pair is None else pair
             if not one.low <= low <= high <= one.high:
-                raise ParameterError(
-                    f"targets = {given} is not allowed: rising, from {one.low:g} to {one.high:g} "
-                    f"{unit_of(one.angle)}"
-                )
+                ends = f"from {one.low:g} to {one.high:g} {unit_of(one.angle)}"
+                raise refused("targets", given, f"rising, {ends}")
             found.append((low, high))
         return found
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import check_names
 from pamrs.control.linear import python_control
 from pamrs.effects import ports_of
 from pamrs.errors import ParameterError
@@ -81,12 +82,7 @@ def iosystem(
     if not inputs:
         raise ParameterError(f"rig {rig.name!r} has no command; a valve or a regulator is needed")
     channels = list(compiled.channels if outputs is None else outputs)
-    for channel in channels:
-        if channel not in compiled.channels:
-            raise ParameterError(
-                f"outputs has {channel!r}, and the rig has no such channel; it has: "
-                f"{', '.join(compiled.channels)}"
-            )
+    check_names("outputs", channels, compiled.channels)
 
     def updated(_: float, state: Array, command: Array, __: Mapping[str, Any]) -> Array:
         simulator.restore(state)

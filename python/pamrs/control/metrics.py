@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import refused
 from pamrs.control._values import angle_factor
 from pamrs.errors import ParameterError
 
@@ -217,9 +218,7 @@ def combined(
             "empty, is needed"
         )
     if not all(math.isfinite(w) and w >= 0.0 for w in weights) or len(weights) != 2:
-        raise ParameterError(
-            f"weights = {weights} is not allowed: two numbers from 0 on are needed"
-        )
+        raise refused("weights", weights, "two numbers from 0 on are needed")
     failed = ~(np.isfinite(nu) & np.isfinite(omega))
     total = np.zeros(nu.shape)
     for name, values, weight in (("error", nu, weights[0]), ("curve", omega, weights[1])):

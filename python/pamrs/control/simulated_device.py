@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs._checks import checked_number, positive
+from pamrs._checks import checked_number, positive, refused
 from pamrs.channels import channel_of, dotted
 from pamrs.control._groups import direct_regulators
 from pamrs.control._protocol import commands_of, keywords_of
@@ -115,7 +115,7 @@ class SimulatedDevice:
     ) -> None:
         checked_number("dropouts", dropouts, 0.0, 1.0)
         if not faults or any(fault not in FAULTS for fault in faults):
-            raise ParameterError(f"faults = {faults} is not allowed: some of {', '.join(FAULTS)}")
+            raise refused("faults", faults, f"some of {', '.join(FAULTS)}")
         self._held = _at_first(rig)
         self._needed = _needed(rig, self._held)
         self.simulator = Simulator(rig, sample_time=sample_time, initial=initial)
@@ -168,10 +168,7 @@ class SimulatedDevice:
         else:
             given = dict.fromkeys(needed, command) if len(needed) == 1 else {}
         if not set(needed) <= set(given) <= set(self._held):
-            raise ParameterError(
-                f"command = {command!r} is not allowed: a number for each of "
-                f"{', '.join(needed)} is needed"
-            )
+            raise refused("command", command, f"a number for each of {', '.join(needed)} is needed")
         self._advance()
         self._held |= {name: float(value) for name, value in given.items()}
         self.written.append((self.clock.now() - self._began, self.command))

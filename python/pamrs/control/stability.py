@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import positive
+from pamrs._checks import as_column, one_of, positive, refused
 from pamrs.control._protocol import Controller
 from pamrs.control.linear import (
     SIDES,
@@ -77,21 +77,17 @@ class Margins:
 
     def __str__(self) -> str:
         """What the margins say, with units."""
-        factor = (
-            f"all gains times {self.gain:.3g} (at {self.gain_frequency:.3g} rad/s)"
-            if math.isfinite(self.gain)
-            else "no gain"
-        )
+        factor = "no gain"
+        if math.isfinite(self.gain):
+            factor = f"all gains times {self.gain:.3g} (at {self.gain_frequency:.3g} rad/s)"
         eigenvalue = f"largest eigenvalue {self.radius:.6g} per sample"
         if self.phase is None or self.delay is None:
             return (
                 f"unstable ({eigenvalue}): no margin of phase or delay; nearest boundary: {factor}"
             )
-        phase = (
-            f"{math.degrees(self.phase):.3g} deg (at {self.phase_frequency:.3g} rad/s)"
-            if math.isfinite(self.phase)
-            else "any"
-        )
+        phase = "any"
+        if math.isfinite(self.phase):
+            phase = f"{math.degrees(self.phase):.3g} deg (at {self.phase_frequency:.3g} rad/s)"
         delay = f"{self.delay:.3g} s" if math.isfinite(self.delay) else "any"
         return (
             f"stable ({eigenvalue}): phase to spare {phase}, delay to spare {delay}; nearest "
@@ -226,11 +222,7 @@ def margins(
         If python-control is not installed.
     """
     library = python_control()
-    linear = (
-        controller
-        if isinstance(controller, LinearController)
-        else linear_controller(controller, model.point)
-    )
+    linear = _linear(model, controller)
     radius = spectral_radius(model, linear, delay=delay)
     opened_at = _command(linear, command)
     period = linear.period
@@ -239,9 +231,8 @@ def margins(
     opened = library.frd(response, frequencies, smooth=True)
     gain, phase, _, at_gain, at_phase, _ = library.stability_margins(opened)
     last = float(response[-1].real)
-    nyquist = (
-        1.0 / abs(last) if last < 0.0 else math.inf
-    )  # the curve ends there on the real axis, which no crossing shows
+    # the curve ends there on the real axis, which no crossing shows
+    nyquist = 1.0 / abs(last) if last < 0.0 else math.inf
     if abs(math.log(nyquist)) < (
         math.inf if gain is None or math.isinf(gain) else abs(math.log(gain))
     ):
@@ -279,27 +270,25 @@ def margins_of_each(
     ParameterError, MissingPackageError
         As :func:`margins`.
     """
-    linear = (
-        controller
-        if isinstance(controller, LinearController)
-        else linear_controller(controller, model.point)
-    )
+    linear = _linear(model, controller)
     return {
         name or model.inputs[0]: margins(model, linear, command=name, delay=delay, points=points)
         for name in linear.outputs
     }
 
 
+def _linear(model: LinearModel, controller: Controller | LinearController) -> LinearController:
+    if isinstance(controller, LinearController):
+        return controller
+    return linear_controller(controller, model.point)
+
+
 def _command(controller: LinearController, command: str | None) -> int:
     """Number of the command at which a loop is opened."""
     if command is None and len(controller.outputs) == 1:
         return 0
-    if command not in controller.outputs:
-        raise ParameterError(
-            f"command = {command!r} is not allowed: one of {', '.join(controller.outputs)}, or "
-            "margins_of_each"
-        )
-    return controller.outputs.index(command)
+    chosen: str = one_of("command", command, controller.outputs, also=" (or margins_of_each)")
+    return controller.outputs.index(chosen)
 
 
 def _response(
@@ -385,13 +374,10 @@ def stable_region(
     ParameterError
         As :func:`pamrs.control.linear.linearise`, or if an axis is empty.
     """
-    grid = {name: np.asarray(values, dtype=np.float64) for name, values in axes.items()}
-    masses = np.asarray(payloads, dtype=np.float64)
-    for name, values in {**grid, "payloads": masses}.items():
-        if values.ndim != 1 or values.size == 0:
-            raise ParameterError(f"{name} has the shape {values.shape}; (n,) with n >= 1 is needed")
+    grid = {name: as_column(name, values) for name, values in axes.items()}
+    masses = as_column("payloads", payloads)
     if not sides or any(side not in SIDES for side in sides):
-        raise ParameterError(f"sides = {tuple(sides)} is not allowed: some of {', '.join(SIDES)}")
+        raise refused("sides", tuple(sides), f"some of {', '.join(SIDES)}")
     radius = np.zeros((masses.size, *(values.size for values in grid.values())))
     period = 0.0
     for p, mass in enumerate(masses):

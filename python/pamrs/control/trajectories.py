@@ -180,9 +180,8 @@ class _Pieces:
     """Cubics one after the other; before the first and behind the last the angle rests."""
 
     starts: tuple[float, ...]
-    cubics: tuple[
-        tuple[float, float, float, float], ...
-    ]  # constant first, in the time since the piece's start; the last rests
+    # constant first, in the time since the piece's start; the last rests
+    cubics: tuple[tuple[float, float, float, float], ...]
 
     def at(self, time: float) -> tuple[float, float, float]:
         k = bisect_right(self.starts, time) - 1

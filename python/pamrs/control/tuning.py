@@ -17,7 +17,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import checked_number, one_of, positive, rising, whole
+from pamrs._checks import (
+    as_column,
+    checked_number,
+    finite,
+    one_of,
+    positive,
+    refused,
+    rising,
+    whole,
+)
 from pamrs._tables import Columns, Tabular
 from pamrs._views import COLOURS, Panels, View, in_laboratory_units
 from pamrs.control._groups import joints_of
@@ -243,24 +252,16 @@ def gain_map(
     >>> best["kp"], best["ki"], round(best["rms"], 3)  # inside the map, not on its border
     (1.0, 10.0, 0.052)
     """
-    grid = {name: np.asarray(values, dtype=np.float64) for name, values in axes.items()}
+    grid = {name: as_column(f"axes {name}", values) for name, values in axes.items()}
     if not grid:
         raise ParameterError("axes is empty: values of one gain at least are needed")
     for name, values in grid.items():
-        if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
-            raise ParameterError(
-                f"axes {name} with the shape {values.shape} is not allowed: (n,) finite numbers, n "
-                ">= 1, are needed"
-            )
+        for value in values:
+            finite(f"axes {name}", value)
     joints_of(plant)  # a rig that lifts nothing is refused
     payload = payload_of(plant)
-    masses = (
-        np.array([plant.parameter(payload).value])
-        if payloads is None
-        else np.asarray(payloads, dtype=np.float64)
-    )
-    if masses.ndim != 1 or masses.size == 0:
-        raise ParameterError(f"payloads has the shape {masses.shape}; (n,) with n >= 1 is needed")
+    given = [plant.parameter(payload).value] if payloads is None else payloads
+    masses = as_column("payloads", given)
     shape = (masses.size, *(values.size for values in grid.values()))
     points = np.meshgrid(*grid.values(), indexing="ij")
     gains = {
@@ -378,10 +379,8 @@ def _check_search(
     one_of("method", method, METHODS)
     whole("population", population, 4, evaluations)
     if scale is None and evaluations < 2 * population:
-        raise ParameterError(
-            f"evaluations = {evaluations} is not allowed: without a scale two populations = "
-            f"{2 * population} are needed, as the first finds it"
-        )
+        needed = f"without a scale two populations = {2 * population} are needed"
+        raise refused("evaluations", evaluations, f"{needed}, as the first finds it")
     whole("seed", seed, 0, 2**32 - 1)
     for size in scale or ():
         positive("scale", size)
@@ -520,9 +519,8 @@ def _box(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
 def _within(start: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> Array:
     """A start in the order of the bounds, checked."""
     if not isinstance(start, Mapping) or set(start) != set(bounds):
-        raise ParameterError(
-            f"start = {start} is not allowed: one value each of {', '.join(bounds)} is needed, as "
-            "in bounds"
+        raise refused(
+            "start", start, f"one value each of {', '.join(bounds)} is needed, as in bounds"
         )
     for name, (low, high) in bounds.items():
         checked_number(f"start of {name}", start[name], low, high)
@@ -586,9 +584,8 @@ def _optuna(
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore", optuna.exceptions.ExperimentalWarning
-            )  # of constant_liar
+            # of constant_liar
+            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
             sampler = optuna.samplers.TPESampler(seed=int(rng.integers(2**31)), constant_liar=True)
         study = optuna.create_study(sampler=sampler)
         if begin is not None:

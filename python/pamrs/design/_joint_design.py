@@ -117,11 +117,9 @@ class JointDesign:
         lines = [f"{'length':<14}{'mm':>9}{'in':>9}   bounds [mm]"]
         for name, value in zip(LENGTHS, self.lengths.tolist(), strict=True):
             low, high = (1e3 * bound for bound in problem.bounds[name])
-            edge = (
-                "  at its bound"
-                if min(1e3 * value - low, high - 1e3 * value) < 1e-3 * (high - low)
-                else ""
-            )
+            edge = ""
+            if min(1e3 * value - low, high - 1e3 * value) < 1e-3 * (high - low):
+                edge = "  at its bound"
             lines.append(
                 f"{name:<14}{1e3 * value:>9.2f}{value / 0.0254:>9.3f}   {low:.4g} to "
                 f"{high:.4g}{edge}"
@@ -142,14 +140,12 @@ class JointDesign:
             lines.append(self._how_met())
         else:
             end = math.degrees(problem.max_angle)
-            why = (
-                ""
-                if scores.available[0]
-                else (
+            why = ""
+            if not scores.available[0]:
+                why = (
                     f"; the muscles turn the joint up to {last:.4g} deg only, {end:.4g} deg are "
                     "required"
                 )
-            )
             lines.append(f"THE REQUIREMENT IS NOT MET: this is the best found{why}")
         lines.append(
             "no pressure makes this joint good enough"

@@ -21,8 +21,10 @@ from numpy.typing import NDArray
 
 from pamrs._checks import checked_number, doubt_pascals, quantities, whole
 from pamrs._views import Panels, View
+from pamrs._writing import write_atomically
 from pamrs.effects import ports_of
 from pamrs.errors import ParameterError
+from pamrs.findings import to_plain
 from pamrs.rig import Joint
 
 if TYPE_CHECKING:
@@ -33,17 +35,7 @@ Array = NDArray[np.float64]
 #: Ports at which an effect changes no static torque at a given pressure: those of the gas, and of
 #: what is recorded.
 _WITHOUT_TORQUE: Final = frozenset(
-    {
-        "command",
-        "passage",
-        "clearance",
-        "leak",
-        "inflow",
-        "feed",
-        "balance",
-        "reading",
-        "clock",
-    }
+    ("command", "passage", "clearance", "leak", "inflow", "feed", "balance", "reading", "clock")
 )
 _LIFTING, _HOLDING = -1.0, 1.0  # direction of the muscles: shortening, about to be drawn out
 
@@ -178,21 +170,8 @@ class Lift(View):
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as numbers and lists, SI units; what is infinite becomes None."""
-        document = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        shown: dict[str, Any] = {}
-        for name, value in document.items():
-            if isinstance(value, np.ndarray):
-                shown[name] = [item if math.isfinite(item) else None for item in value.tolist()]
-            else:
-                shown[name] = (
-                    None if isinstance(value, float) and not math.isfinite(value) else value
-                )
-        return {
-            **shown,
-            "lifts": self.lifts.tolist(),
-            "holds": self.holds.tolist(),
-            "text": self.text,
-        }
+        told = {"lifts": self.lifts.tolist(), "holds": self.holds.tolist(), "text": self.text}
+        return {**to_plain(vars(self)), **told}
 
     def _panels(self) -> Panels:
         from pamrs.design import _lifting_figure as figure
@@ -218,7 +197,6 @@ class Lift(View):
         Path
             The file written.
         """
-        from pamrs._writing import write_atomically
         from pamrs.design._lifting_figure import lift_png
 
         return write_atomically(path, lift_png(self))
@@ -275,9 +253,8 @@ def lift(
             f"rig {rig.name!r} has an arm of several links: what it lifts is found for a one-link "
             "arm only"
         )
-    core_rig(
-        rig
-    )  # refuses lengths that the muscle cannot have, and angles that the tendon does not reach
+    # refuses lengths that the muscle cannot have, and angles that the tendon does not reach
+    core_rig(rig)
     pressure = _pressure(rig, pressure)
     joint = next(iter(rig.tables("joint").values()))
     low, high = float(joint["min_angle"]), float(joint["max_angle"])

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import positive, whole
+from pamrs._checks import positive, refused, whole
 from pamrs.design._evaluator import Genetic, Progress
 from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, optimise
 from pamrs.design._problem import JointProblem
@@ -229,9 +229,7 @@ def least_pressure(
         If an argument is not possible.
     """
     if not largest_size > 0.0:
-        raise ParameterError(
-            f"largest_size = {largest_size} is not allowed: a length above 0 m is needed"
-        )
+        raise refused("largest_size", largest_size, "a length above 0 m is needed")
 
     def objective(points: Array) -> Array:
         needed = problem.needed_pressure(points)
@@ -249,11 +247,9 @@ def least_pressure(
         seed=seed,
         progress=progress,
     )
-    return (
-        JointDesign(problem.replace(pressure=found.value), found.point, found)
-        if found.value < 1e10
-        else None
-    )
+    if found.value < 1e10:
+        return JointDesign(problem.replace(pressure=found.value), found.point, found)
+    return None
 
 
 @dataclass(frozen=True)
@@ -276,11 +272,7 @@ class ParetoFront:
 
     def to_dict(self) -> dict[str, Any]:
         """Numbers in SI units, ready for JSON."""
-        return {
-            "size": self.size.tolist(),
-            "pressure": self.pressure.tolist(),
-            "lengths": self.lengths.tolist(),
-        }
+        return {name: values.tolist() for name, values in vars(self).items()}
 
 
 def pareto_front(

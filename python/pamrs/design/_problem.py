@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import one_of, positive, whole
+from pamrs._checks import check_names, one_of, positive, refused, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
 
@@ -35,9 +35,8 @@ DEFAULT_BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "lower_offset": (-0.0127, 0.0254),
 }
 
-_HOPELESS: Final = (
-    1e10  # [Pa], stands for "no pressure is enough"; larger the less of the range is reached
-)
+# [Pa], stands for "no pressure is enough"; larger the less of the range is reached
+_HOPELESS: Final = 1e10
 
 
 @dataclass(frozen=True)
@@ -325,10 +324,8 @@ class JointProblem:
         for index, row in enumerate(rows):
             try:
                 joint = self.joint(row)
-            except (
-                ParameterError
-            ):  # the tendon would be folded over at the least angle: out of reach
-                continue
+            except ParameterError:
+                continue  # the tendon would be folded over at the least angle: out of reach
             reached = joint.reaches(angles)
             contraction[index, reached] = joint.shortening(angles[reached]) / length
             arm[index, reached] = joint.moment_arm(angles[reached])
@@ -348,23 +345,16 @@ class JointProblem:
 
 def _checked_bounds(given: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     """Every length with its bounds."""
-    for name in given:
-        if name not in LENGTHS:
-            raise ParameterError(
-                f"bounds has {name!r}, which is not a length of the joint: {', '.join(LENGTHS)}"
-            )
+    check_names("bounds", given, LENGTHS)
     bounds = {}
     for name in LENGTHS:
         pair = given.get(name, DEFAULT_BOUNDS[name])
         if len(pair) != 2 or not all(math.isfinite(value) for value in pair) or pair[0] > pair[1]:
-            raise ParameterError(
-                f"bounds[{name!r}] = {pair} is not allowed: two finite lengths, the lower one "
-                "first, are needed"
+            raise refused(
+                f"bounds[{name!r}]", pair, "two finite lengths, the lower one first, are needed"
             )
         if name.endswith("axial") and pair[0] <= 0.0:
-            raise ParameterError(
-                f"bounds[{name!r}] = {pair} is not allowed: this length must be above 0 m"
-            )
+            raise refused(f"bounds[{name!r}]", pair, "this length must be above 0 m")
         bounds[name] = (float(pair[0]), float(pair[1]))
     return bounds
 

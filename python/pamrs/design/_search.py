@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import one_of, whole
+from pamrs._checks import one_of, refused, whole
 from pamrs.design._evaluator import Array, Evaluator, Genetic, Objective, Progress, Search
-from pamrs.errors import ParameterError, missing_package
+from pamrs.errors import missing_package
 
 #: Genetic algorithm of 3.5, differential evolution, CMA-ES, and independent random points.
 METHODS: Final = ("ga", "de", "cma", "random")
@@ -70,10 +70,8 @@ def search(
     settings = genetic or Genetic()
     one_of("method", method, METHODS)
     if evaluations < settings.population:
-        raise ParameterError(
-            f"evaluations = {evaluations} is not allowed: at least one population of "
-            f"{settings.population} is needed"
-        )
+        least = f"at least one population of {settings.population} is needed"
+        raise refused("evaluations", evaluations, least)
     whole("seed", seed)
     low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
     evaluator = Evaluator(objective, low, high, evaluations, progress)

@@ -22,8 +22,6 @@ from pamrs.design._pressure import ParetoFront
 from pamrs.design._problem import SYMBOLS
 from pamrs.report.figures import COLOURS, STYLE
 
-__all__ = ["summary_png"]
-
 _SERIES: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
 _QUIET, _INK, _PLATE, _MUSCLE = "#9aa3af", "#374151", "#e5e7eb", "#c79a00"
 _NAMES: Final = {

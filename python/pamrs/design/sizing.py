@@ -339,16 +339,13 @@ def size(
             count, reason = _count(candidate, requirement, supply, max_count)
             if not reason:
                 rows.append(_row(candidate, count, requirement, supply, core))
-        except (
-            ParameterError
-        ) as error:  # its geometry has no solution at a length that is asked for
+        except ParameterError as error:
+            # its geometry has no solution at a length that is asked for
             reason = str(error)
         if reason:
-            hint = (
-                f" (its pressure is {candidate.pressure:g} Pa: were bar meant?)"
-                if candidate.pressure < _LEAST_PRESSURE
-                else ""
-            )
+            hint = ""
+            if candidate.pressure < _LEAST_PRESSURE:
+                hint = f" (its pressure is {candidate.pressure:g} Pa: were bar meant?)"
             infeasible[candidate.name] = reason + hint
     return SizingResult(rows, infeasible)
 

@@ -9,6 +9,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Final
 
+from pamrs._checks import refused
 from pamrs.effects import CATALOGUE, EffectInfo, EffectParameter, Form
 from pamrs.errors import ParameterError
 from pamrs.units import with_unit
@@ -123,7 +124,7 @@ def snippet(
     info, given = entry(effect), values or {}
     chosen = _form(info, form)
     if at and not info.at:
-        raise ParameterError(f"at = {at!r} is not allowed: {effect} acts on the whole rig")
+        raise refused("at", at, f"{effect} acts on the whole rig")
     names = [parameter.name for parameter in chosen.parameters]
     if unknown := [name for name in given if name not in names]:
         raise ParameterError(f"{effect} has no parameter {unknown[0]!r}; it has {', '.join(names)}")
@@ -145,7 +146,7 @@ def _form(info: EffectInfo, name: str) -> Form:
         return info.form(name)
     except KeyError:
         allowed = ", ".join(repr(form.name) for form in info.forms)
-        raise ParameterError(f"form = {name!r} is not allowed: {info.id} has {allowed}") from None
+        raise refused("form", name, f"{info.id} has {allowed}") from None
 
 
 def overview() -> str:

@@ -9,8 +9,6 @@ from pamrs.fit._data import ForceMap
 from pamrs.fit._ways import series_ways
 from pamrs.recordings import Recording
 
-__all__ = ["from_recording"]
-
 
 def from_recording(
     recording: Recording,

@@ -15,8 +15,6 @@ from pamrs.fit._estimate import Estimate, Problem
 from pamrs.fit._statistics import FitParameter
 from pamrs.units import with_unit
 
-__all__ = ["FAR", "cautions", "outlying"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]

@@ -6,23 +6,18 @@ columns can be to blame, all are named.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.errors import RecordingError
+from pamrs.errors import ParameterError, RecordingError
 from pamrs.units import parse_unit
 
-__all__ = [
-    "FORCE_HIGH",
-    "PRESSURE_HIGH",
-    "absolute_pressures",
-    "check_forces",
-    "check_units",
-    "reachable",
-]
+if TYPE_CHECKING:
+    from pamrs.rig import Muscle
 
 Array = NDArray[np.float64]
 
@@ -46,6 +41,16 @@ _AMBIENT: Final = (90e3, 112e3)
 _NEAR_REST, _BAND = 0.01, 0.003  # contraction of the longest lengths, and how far it may spread
 _LEVELS: Final = 4
 _SURE: Final = 5e3  # standard error of the pressure at which forces vanish [Pa]
+
+
+def check_rest_length(muscle: Muscle, rest_length: float) -> None:
+    """Refuse a muscle of another rest length [m] than its measurements."""
+    rest = float(muscle.parameters["rest_length"])
+    if not math.isclose(rest, rest_length, rel_tol=1e-6):
+        raise ParameterError(
+            f"rest_length: the muscle has {rest:g} m, the force map {rest_length:g} m; the same "
+            "is needed"
+        )
 
 
 def reachable(length: Array, rest: float) -> NDArray[np.bool_]:

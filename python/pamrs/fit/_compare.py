@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import refused
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._cautions import FAR
 from pamrs.fit._design import CONSTANTS, template
@@ -20,8 +21,6 @@ from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODEL
 if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
     from pamrs.rig import Muscle
-
-__all__ = ["ModelComparison", "compare_models"]
 
 _NEAR: Final = 1.25  # times the best leave-one-pressure-out error, for a recommendation
 
@@ -221,7 +220,7 @@ def compare_models(
     wanted = sorted({int(order) for order in orders})
     unknown = [name for name in chosen if name not in MODELS]
     if unknown or not chosen:
-        raise ParameterError(f"models = {chosen} is not allowed: of {', '.join(MODELS)}")
+        raise refused("models", chosen, f"of {', '.join(MODELS)}")
     pairs = [
         (name, order)
         for name in chosen
@@ -406,9 +405,8 @@ def effective_size(fit: MuscleFit) -> float:
     level, length, way = fit.data.level[rows], fit.data.length[rows], fit.data.direction[rows]
     order = np.lexsort((length, level, way))
     level, length, way, residual = level[order], length[order], way[order], fit.residual[order]
-    same = (level[1:] == level[:-1]) & (
-        way[1:] == way[:-1]
-    )  # neighbours on one branch: the branches of a loop lie apart
+    # neighbours on one branch: the branches of a loop lie apart
+    same = (level[1:] == level[:-1]) & (way[1:] == way[:-1])
     along = _correlation(residual[1:][same], residual[:-1][same])
     below, above = [np.empty(0)], [np.empty(0)]
     for branch in np.unique(way):

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from pamrs.fit._estimate import Estimate, Problem
 
-__all__ = ["covariances", "levels_needed"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import quantities
+from pamrs._checks import positive, quantities, refused
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._checks import (
     FORCE_HIGH,
     PRESSURE_HIGH,
     absolute_pressures,
     check_forces,
+    check_rest_length,
     check_units,
     reachable,
 )
@@ -27,8 +28,6 @@ from pamrs.fit._ways import table_ways
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
-
-__all__ = ["LEFT_OUT", "ForceMap"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -182,13 +181,8 @@ class ForceMap:
             )
         long, gas, pull = columns.values()
         rest = _rest_length(rest_length)
-        if level_tolerance is not None and not (
-            math.isfinite(level_tolerance) and level_tolerance > 0.0
-        ):
-            raise ParameterError(
-                f"level_tolerance = {level_tolerance!r} Pa is not allowed: a positive number is "
-                "needed"
-            )
+        if level_tolerance is not None:
+            positive("level_tolerance", level_tolerance)
         given = dict(units or {})
         finite = np.isfinite(long) & np.isfinite(gas) & np.isfinite(pull)
         check_units(label, long[finite], gas[finite], rest, given)
@@ -300,11 +294,9 @@ class ForceMap:
 
     def _found(self, why: str, rows: Sequence[int]) -> str:
         one, several, rest = _WORDS.get(why, ("is", "are", why))
-        return (
-            f"1 row of {len(self)} {one} {rest}"
-            if len(rows) == 1
-            else f"{len(rows)} rows of {len(self)} {several} {rest}"
-        )
+        if len(rows) == 1:
+            return f"1 row of {len(self)} {one} {rest}"
+        return f"{len(rows)} rows of {len(self)} {several} {rest}"
 
     def _places(self, rows: Sequence[int]) -> str:
         """The first of some rows, by their number in the file or else by their index."""
@@ -369,10 +361,7 @@ class ForceMap:
         count = len(self.levels)
         strange = [index for index in levels if not -count <= index < count]
         if strange or not len(levels):
-            raise ParameterError(
-                f"levels = {list(levels)} is not allowed: indices from 0 to {count - 1}, one at "
-                "least"
-            )
+            raise refused("levels", list(levels), f"indices from 0 to {count - 1}, one at least")
         chosen = np.unique(np.asarray(levels, dtype=np.intp) % count)
         return self._without(~np.isin(self.level, chosen), LEFT_OUT)
 
@@ -449,12 +438,7 @@ class ForceMap:
             If the forces are beyond three times or below a hundredth of what the gas could do (a
             wrong unit), or fewer than two rows are left.
         """
-        rest = float(muscle.parameters["rest_length"])
-        if not math.isclose(rest, self.rest_length, rel_tol=1e-6):
-            raise ParameterError(
-                f"rest_length: the muscle has {rest:g} m, the force map {self.rest_length:g} m; "
-                "the same is needed"
-            )
+        check_rest_length(muscle, self.rest_length)
         low, high = muscle.contraction_limits
         e = self.contraction
         map_ = self._without(self.used & ~((e >= low) & (e <= high)), "beyond the braid")

@@ -13,8 +13,6 @@ from pamrs.errors import RecordingError, joined
 from pamrs.rig import Muscle, Reader, muscle_problems
 from pamrs.rig.muscle_models import models_with
 
-__all__ = ["NO_MODULI", "SCHEMA", "Description", "read_description", "with_moduli"]
-
 SCHEMA: Final = "pamrs.force_map/1"
 _ENTRY: Final = {"anyOf": [TEXT, {"type": "object"}]}
 _CELL: Final = {"anyOf": [TEXT, NUMBER, BOOLEAN]}

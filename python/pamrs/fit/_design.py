@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.errors import FitError, ParameterError
+from pamrs._checks import one_of, refused
+from pamrs.errors import FitError
 from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODELS
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
-
-__all__ = ["CONSTANTS", "Design", "template"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -59,8 +58,7 @@ def template(muscle: Muscle, model: str | None, geometry: str | None, order: int
         If the model is unknown, or the order does not go with it.
     """
     name = muscle.model if model is None else model
-    if name not in MODELS:
-        raise ParameterError(f"model = {name!r} is not allowed: one of {', '.join(MODELS)}")
+    one_of("model", name, MODELS)
     changes: dict[str, Any] = {"model": name}
     if geometry is not None or name != muscle.model:
         changes["geometry"] = geometry
@@ -73,15 +71,10 @@ def template(muscle: Muscle, model: str | None, geometry: str | None, order: int
             or not isinstance(terms, (int, np.integer))
             or not 1 <= terms <= _LARGEST_ORDER
         ):
-            raise ParameterError(
-                f"order = {order!r} is not allowed: a whole number from 1 to {_LARGEST_ORDER}"
-            )
+            raise refused("order", order, f"a whole number from 1 to {_LARGEST_ORDER}")
         changes |= {"modulus_slope": [0.0] * int(terms), "modulus_offset": [0.0] * int(terms)}
     elif order is not None:
-        raise ParameterError(
-            f"order = {order!r} is not allowed: the model {name} has no stress polynomial; leave "
-            "order out"
-        )
+        raise refused("order", order, f"the model {name} has no stress polynomial; leave order out")
     else:
         changes |= dict.fromkeys(CONSTANTS[name], 0.0)
     return muscle.replace(**changes)
@@ -108,8 +101,7 @@ class Design:
     @classmethod
     def of(cls, muscle: Muscle, moduli: str, knots: Array) -> Design:
         """The design of a template muscle; ``moduli`` is ``"linear"`` or ``"per_level"``."""
-        if moduli not in ("linear", "per_level"):
-            raise ParameterError(f"moduli = {moduli!r} is not allowed: 'linear' or 'per_level'")
+        one_of("moduli", moduli, ("linear", "per_level"))
         if muscle.model in POLYNOMIAL_MODELS:
             base = tuple(f"E{k}" for k in range(1, len(muscle.parameters["modulus_offset"]) + 1))
         else:

@@ -19,8 +19,6 @@ from pamrs.fit._problem import decompose, project_out, solve
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["Estimate", "Free", "Known", "Problem", "estimate"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -49,11 +47,9 @@ class Free:
     @property
     def scale(self) -> float:
         """Step size of the search."""
-        return (
-            self.tolerance
-            if math.isfinite(self.tolerance)
-            else _NO_TOLERANCE_SCALE * max(abs(self.nominal), 1e-3)
-        )
+        if math.isfinite(self.tolerance):
+            return self.tolerance
+        return _NO_TOLERANCE_SCALE * max(abs(self.nominal), 1e-3)
 
 
 @dataclass(frozen=True)
@@ -102,13 +98,11 @@ class Problem:
 
     def muscle(self, values: Array) -> Muscle:
         """The template with other geometry values."""
-        return (
-            self.blank.replace(
+        if self.free:
+            return self.blank.replace(
                 **{free.name: float(v) for free, v in zip(self.free, values, strict=True)}
             )
-            if self.free
-            else self.blank
-        )
+        return self.blank
 
     def system(self, design: Design, muscle: Muscle, rows: Mask) -> tuple[Array, Array]:
         """Weighted design matrix (n, k) and target (n,) of some rows for one geometry."""
@@ -127,11 +121,8 @@ class Problem:
         """
         values, variance = np.zeros(len(design.names)), np.zeros(len(design.names))
         for i, parts in enumerate(design.kinds):
-            for (
-                kind,
-                place,
-                factor,
-            ) in parts:  # one, or slope and offset of a modulus at one pressure
+            # one, or slope and offset of a modulus at one pressure
+            for kind, place, factor in parts:
                 if factor == 0.0:  # a slope at no pressure
                     continue
                 known = self.known.get(kind, _UNKNOWN)
@@ -254,9 +245,8 @@ def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Est
 def _check_counts(problem: Problem, design: Design, rows: Mask) -> None:
     """Name what is missing before the algebra does."""
     n, k = int(rows.sum()), len(design.names)
-    told = int(
-        np.count_nonzero(problem.expected(design)[1])
-    )  # a coefficient with a prior needs no point
+    # a coefficient with a prior needs no point
+    told = int(np.count_nonzero(problem.expected(design)[1]))
     # A tolerance is an equation of its own, but what it weighs against the data must come from
     # points to spare.
     extra = (
@@ -515,11 +505,9 @@ def _check_identified(problem: Problem, result: Estimate) -> None:
     priors = np.diag(result.sigma * problem.information(result.design))
     loose = [free.name for free in problem.free if math.isinf(free.tolerance)]
     stacked = np.vstack([result.jacobian, priors])
-    hint = (
-        f"; give a tolerance for {', '.join(loose)}"
-        if loose
-        else "; take a lower order, or free less geometry"
-    )
+    hint = "; take a lower order, or free less geometry"
+    if loose:
+        hint = f"; give a tolerance for {', '.join(loose)}"
     _, _, s, _ = decompose(stacked, names, hint)
     if loose and s[-1] < 1e-7 * s[0]:  # differences carry no more digits
         raise FitError(

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from pamrs.fit._result import MuscleFit
     from pamrs.rig import Rig
 
-__all__ = ["fit_report", "to_dict", "to_lmfit", "to_rig"]
-
-
 _NUMBERS: Final = (
     *("errors", "ndata", "nvarys", "chisqr", "redchi", "aic", "aicc", "bic", "rsquared"),
     *("condition_number", "rms_error", "max_error"),
@@ -30,14 +27,8 @@ _NUMBERS: Final = (
 def fit_report(fit: MuscleFit) -> str:
     """What :meth:`MuscleFit.fit_report` returns."""
     order = "" if fit.order is None else f", order {fit.order}"
-    moduli = (
-        ""
-        if not fit.nvarys
-        else (
-            ", moduli "
-            f"{'linear in pressure' if fit.moduli_kind == 'linear' else 'free at each level'}"
-        )
-    )
+    law = "linear in pressure" if fit.moduli_kind == "linear" else "free at each level"
+    moduli = f", moduli {law}" if fit.nvarys else ""
     rms, worst = fit.errors_of("fitted") or (0.0, 0.0)
     lines = [
         f"{fit.data.label}: {fit.model}{order}{moduli}",

@@ -22,18 +22,6 @@ if TYPE_CHECKING:
     from pamrs.fit._result import MuscleFit
     from pamrs.fit._statistics import FitStatistics
 
-__all__ = [
-    "ErrorCurve",
-    "draw_family",
-    "errors_svg",
-    "family_svg",
-    "moduli_svg",
-    "pressure_colours",
-    "residuals_svg",
-    "summary_png",
-    "thinned",
-]
-
 Array = NDArray[np.float64]
 
 #: Colours and marks of compared models (after Okabe and Ito).

@@ -28,8 +28,6 @@ from pamrs.recordings.table import (
 )
 from pamrs.units import parse_unit, same_dimension, to_si
 
-__all__ = ["Columns", "read_map"]
-
 Array = NDArray[np.float64]
 
 # channel -> SI unit
@@ -63,9 +61,8 @@ _DIRECTIONS: Final = {
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]\s*$")
 _NUMERIC = re.compile(r"[-+]?(\d[\d.,]*|[.,]\d+)([eE][-+]?\d+)?")
 _NARROW: Final = 0.006  # a map of contractions from 0 to less than 0.6 % is one of fractions
-_SET_POINTS: Final = (
-    50  # a pressure with fewer distinct values in a time series is a set point, not a sensor
-)
+# a pressure with fewer distinct values in a time series is a set point, not a sensor
+_SET_POINTS: Final = 50
 
 
 class _Column(NamedTuple):

@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import refused
 from pamrs._views import Panels, View
 from pamrs.errors import ParameterError, RecordingError
+from pamrs.findings import to_plain
 from pamrs.fit._data import ForceMap
 from pamrs.fit._validation import WEAK
 from pamrs.fit._ways import held_lengths
@@ -26,27 +28,31 @@ from pamrs.fit.levels import LawParameter, LevelLine, fit_levels
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["FrictionFit", "FrictionLevel", "fit_friction"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _FEWEST: Final = 4  # rows of a branch
 _BINS: Final = 200  # of a branch's contraction: rows nearer than that are averaged
-_BLOCKS: Final = (
-    8  # stretches of contraction whose coefficients are compared for the standard error
-)
-_SLACK: Final = (
-    0.05  # of a level's largest mean force: below it a loop tells nothing about the ratio
-)
-_HALFWAY: Final = (
-    2.0 / 7.0
-)  # of the presliding distance, where slip elements of 1/8, 1/4, 1/2 and 1 of it average to zero
+# stretches of contraction whose coefficients are compared for the standard error
+_BLOCKS: Final = 8
+# of a level's largest mean force: below it a loop tells nothing about the ratio
+_SLACK: Final = 0.05
+# of the presliding distance, where slip elements of 1/8, 1/4, 1/2 and 1 of it average to zero
+_HALFWAY: Final = 2.0 / 7.0
 _PART_WAY: Final = 0.95  # of the way to either branch: rows within are in transition
 _RESOLVED: Final = 3  # rows in transition that a reversal needs
 _NEAR_TURN: Final = 0.05  # of the range of a pressure cycle, where the force is between branches
 _SIGNIFICANT: Final = 0.05
 _SURE: Final = 4.0  # standard errors, for a friction that nobody asked about
+_OF_A_LEVEL: Final = (
+    *("pressure", "coefficient", "stderr", "law", "at_floor", "rows"),
+    *("contraction", "force", "half_width"),
+)
+_TOLD: Final = (
+    *("parameters", "floor", "presliding", "presliding_reason", "levels", "residual", "ndata"),
+    *("nvarys", "nfree", "redchi", "between", "covar", "slope_pvalue", "slope_significant"),
+    *("isometric", "issues"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,28 +268,14 @@ class FrictionFit(View):
 
     def to_dict(self) -> dict[str, Any]:
         """The result as plain data, SI units; None where a number is not determinable."""
-        plain = ("pressure", "coefficient", "stderr", "law", "at_floor", "rows")
-        arrays = ("contraction", "force", "half_width")
         levels = [
-            {
-                **{key: law if key == "law" else getattr(level, key) for key in plain},
-                **{key: getattr(level, key).tolist() for key in arrays},
-            }
+            {key: law if key == "law" else getattr(level, key) for key in _OF_A_LEVEL}
             for level, law in zip(self.levels, self.best_fit.tolist(), strict=True)
         ]
-        return {
-            "parameters": [
-                {**asdict(item), "stderr": _or_none(item.stderr)} for item in self.params.values()
-            ],
-            **{key: getattr(self, key) for key in ("floor", "presliding", "presliding_reason")},
-            "levels": levels,
-            "residual": self.residual.tolist(),
-            **{key: getattr(self, key) for key in ("ndata", "nvarys", "nfree")},
-            **{key: _or_none(getattr(self, key)) for key in ("redchi", "between")},
-            "covar": [[_or_none(value) for value in row] for row in self.covar.tolist()],
-            "slope_pvalue": _or_none(self.slope_pvalue),
-            **{key: getattr(self, key) for key in ("slope_significant", "isometric", "issues")},
-        }
+        own = {"parameters": [asdict(item) for item in self.params.values()], "levels": levels}
+        plain = {key: own[key] if key in own else getattr(self, key) for key in _TOLD}
+        found: dict[str, Any] = to_plain(plain)
+        return found
 
     def _slope_words(self) -> str:
         if math.isnan(self.slope_pvalue):
@@ -317,7 +309,7 @@ def fit_friction(data: ForceMap, *, floor: float = 0.01) -> FrictionFit:
         If no direction is known or can be told, or fewer than two pressures have both branches.
     """
     if not (math.isfinite(floor) and 0.0 <= floor < 1.0):
-        raise ParameterError(f"floor = {floor!r} is not allowed: at least 0 and below 1")
+        raise refused("floor", floor, "at least 0 and below 1")
     data = data.with_directions()
     gas, e, _, _, way = data.used_rows()
     if not np.any(way):
@@ -476,10 +468,6 @@ def _doubts(levels: list[FrictionLevel], above: Mask, floor: float) -> list[str]
             "pressure"
         )
     return found
-
-
-def _or_none(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _loop(

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
     from pamrs.fit._friction import FrictionFit
 
-__all__ = ["draw_law", "friction_png"]
-
 _INK: Final = "#374151"
 _MARKS: Final = ((-1, "v", "contracting"), (1, "^", "lengthening"))
 

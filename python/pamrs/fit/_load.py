@@ -16,8 +16,6 @@ from pamrs.fit._files import Columns, read_map
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["MeasuredMuscle", "load_force_map", "load_measured_muscle"]
-
 
 @dataclass(frozen=True, eq=False)
 class MeasuredMuscle:
@@ -102,16 +100,9 @@ def load_force_map(
         or the wrong one, or fewer than two rows are usable.
     """
     file = Path(path)
-    given: dict[str, Any] = {
-        "rest_length": rest_length,
-        "columns": columns,
-        "where": where,
-        "clipped": clipped,
-        "level_tolerance": level_tolerance,
-        "delimiter": delimiter,
-        "decimal": decimal,
-        "name": name,
-    }
+    given: dict[str, Any] = dict(locals())  # what says how a table is read, by its name
+    for key in ("path", "allow_outside", "file"):
+        del given[key]
     if file.suffix.lower() != ".toml":
         return read_map(file, **given)
     for key, value in given.items():

@@ -17,14 +17,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import contraction_of, refused
 from pamrs._views import Panels, View
-from pamrs.errors import ParameterError, RecordingError
+from pamrs.errors import RecordingError
+from pamrs.findings import to_plain
+from pamrs.fit._checks import check_rest_length
 from pamrs.fit._data import ForceMap
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle, Rig
-
-__all__ = ["MapFit", "fit_map"]
 
 Array = NDArray[np.float64]
 
@@ -122,11 +123,8 @@ class MapFit(View):
         ParameterError
             If not one of contraction and length is given.
         """
-        if (contraction is None) == (length is None):
-            raise ParameterError("give contraction or length, one of the two")
-        if contraction is None:
-            contraction = 1.0 - np.asarray(length, dtype=np.float64) / self.rest_length
-        return _predict(self.pressure, self.contraction, self.force, pressure, contraction)
+        asked = contraction_of(contraction, length, self.rest_length)
+        return _predict(self.pressure, self.contraction, self.force, pressure, asked)
 
     def to_muscle(self, muscle: Muscle) -> Muscle:
         """A muscle with this table.
@@ -146,12 +144,7 @@ class MapFit(View):
         ParameterError
             If its rest length is another.
         """
-        rest = float(muscle.parameters["rest_length"])
-        if not math.isclose(rest, self.rest_length, rel_tol=1e-6):
-            raise ParameterError(
-                f"rest_length: the muscle has {rest:g} m, the force map {self.rest_length:g} m; "
-                "the same is needed"
-            )
+        check_rest_length(muscle, self.rest_length)
         return muscle.replace(
             model="map",
             geometry=muscle.geometry,
@@ -197,11 +190,9 @@ class MapFit(View):
     def fit_report(self) -> str:
         """The result as text."""
         p, e = self.pressure / 1e3, 100.0 * self.contraction
-        between = (
-            "not determinable, fewer than three levels"
-            if math.isnan(self.between)
-            else f"{self.between:.3g} N rms"
-        )
+        between = "not determinable, fewer than three levels"
+        if not math.isnan(self.between):
+            between = f"{self.between:.3g} N rms"
         lines = [
             "force table of the muscle: monotone in pressure and contraction",
             f"  {len(p)} pressures from {p[0]:.4g} to {p[-1]:.4g} kPa, {len(e)} contractions from "
@@ -219,14 +210,8 @@ class MapFit(View):
 
     def to_dict(self) -> dict[str, Any]:
         """The result as plain data, SI units; None where a number is not determinable."""
-        return {
-            name: value.tolist()
-            if isinstance(value, np.ndarray)
-            else None
-            if isinstance(value, float) and math.isnan(value)
-            else value
-            for name, value in vars(self).items()
-        }
+        found: dict[str, Any] = to_plain(vars(self))
+        return found
 
 
 def fit_map(data: ForceMap, *, nodes: int = _NODES) -> MapFit:
@@ -253,7 +238,7 @@ def fit_map(data: ForceMap, *, nodes: int = _NODES) -> MapFit:
         If there are fewer than two pressures or fewer than three contractions.
     """
     if not 3 <= int(nodes) <= _MOST_NODES:
-        raise ParameterError(f"nodes = {nodes!r} is not allowed: from 3 to {_MOST_NODES}")
+        raise refused("nodes", nodes, f"from 3 to {_MOST_NODES}")
     data = data.with_directions()
     gas, e, pull, _, way = data.used_rows()
     pressure = _levels(data)

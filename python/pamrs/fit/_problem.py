@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from pamrs.errors import FitError
 
-__all__ = ["Solution", "decompose", "project_out", "solve"]
-
 Array = NDArray[np.float64]
 
 #: Ratio of the smallest to the largest singular value below which columns count as collinear.

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import quantities
+from pamrs._checks import contraction_of, one_of, quantities
 from pamrs._views import Panels, View
 from pamrs.errors import ParameterError
 from pamrs.fit._design import friction_factor
 from pamrs.fit._estimate import geometry_slopes
-from pamrs.fit._statistics import FitParameter, FitStatistics, determination
+from pamrs.fit._statistics import FitStatistics, determination
 from pamrs.fit._validation import CrossValidation, PressureErrors, leave_one_out, summary
 from pamrs.units import with_unit
 
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from pamrs.fit._compare import ModelComparison
     from pamrs.fit._data import ForceMap
     from pamrs.rig import Muscle, Rig
-
-__all__ = ["OUTSIDE_CONTRACTION", "OUTSIDE_PRESSURE", "FitParameter", "MuscleFit"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
@@ -98,9 +96,8 @@ class MuscleFit(View, FitStatistics):
             None when there is no such row.
         """
         masks = {"fitted": self._rows, "held_out": ~self._rows, "all": np.ones_like(self._rows)}
-        if rows not in masks:
-            raise ParameterError(f"rows = {rows!r} is not allowed: one of {', '.join(masks)}")
-        return summary(self.all_residuals[masks[rows]], float(self._problem.force.max()))
+        chosen = masks[one_of("rows", rows, masks)]
+        return summary(self.all_residuals[chosen], float(self._problem.force.max()))
 
     @property
     def rms_error(self) -> float:
@@ -145,14 +142,8 @@ class MuscleFit(View, FitStatistics):
         direction: ArrayLike | None,
     ) -> tuple[Array, Array, Array]:
         """Pressure, contraction, direction in one shape; direction NaN-free, 0 where none."""
-        if (contraction is None) == (length is None):
-            raise ParameterError("give contraction or length, one of the two")
-        if length is not None:
-            contraction = (
-                1.0
-                - np.asarray(length, dtype=np.float64)
-                / self._estimate.blank.parameters["rest_length"]
-            )
+        rest = self._estimate.blank.parameters["rest_length"]
+        contraction = contraction_of(contraction, length, rest)
         way = 0.0 if direction is None else direction
         p, e, d = np.broadcast_arrays(
             *(np.asarray(v, dtype=np.float64) for v in (pressure, contraction, way))
@@ -315,9 +306,8 @@ class MuscleFit(View, FitStatistics):
         used = chosen.used
         way = chosen.direction[used] if np.any(self._problem.direction) else None
         if way is not None and self.model == "elbow_linear":
-            way = np.where(
-                way == 0, -1, way
-            )  # as in the fit: rows of unknown direction are on the contracting branch
+            # as in the fit: rows of unknown direction are on the contracting branch
+            way = np.where(way == 0, -1, way)
         force = self.predict(chosen.pressure[used], length=chosen.length[used], direction=way)
         return determination(chosen.force[used], force)
 

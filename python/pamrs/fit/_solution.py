@@ -7,13 +7,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import one_of, refused
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._cautions import cautions
+from pamrs.fit._checks import check_rest_length
 from pamrs.fit._covariance import covariances, levels_needed
 from pamrs.fit._design import template
 from pamrs.fit._estimate import Estimate, Free, Known, Problem, estimate
@@ -25,8 +27,6 @@ from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, POLYNOMIAL_MODELS
 if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
     from pamrs.rig import Muscle
-
-__all__ = ["COEFFICIENTS", "GEOMETRY", "fit_muscle", "has_effect", "level_indices"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -160,25 +160,22 @@ def fit_muscle(
     >>> fit.x.round(4)[:2].tolist()
     [3.0, -0.35]
     """
-    _choices(weights=weights, errors=errors, direction=direction)
+    one_of("weights", weights, ("force", "level"))
+    one_of("errors", errors, ("level", "plain"))
+    one_of("direction", direction, ("data", None))
     rows = _chosen(data, levels)
     blank = template(muscle, model, geometry, order)
     spread = _tolerances(tolerance)
     unknowns = _free(blank, tuple(free), spread)
     known = _known(muscle, blank, spread)
     if noise is not None and not (_is_number(noise) and 0.0 < noise < math.inf):
-        raise ParameterError(f"noise = {noise!r} is not allowed: a positive number is needed")
+        raise refused("noise", noise, "a positive number is needed")
     if known and noise is None:
         raise ParameterError(
             f"tolerance of {', '.join(known)} needs noise: the standard deviation of the forces "
             "that it is weighed against"
         )
-    rest = float(blank.parameters["rest_length"])
-    if not math.isclose(rest, data.rest_length, rel_tol=1e-6):
-        raise ParameterError(
-            f"rest_length: the muscle has {rest:g} m, the force map {data.rest_length:g} m; the "
-            "same is needed"
-        )
+    check_rest_length(blank, data.rest_length)
     problem = _problem(data, blank, moduli, unknowns, known, noise, direction)
     if not float(problem.force[rows].max()) > 0.0:
         raise FitError(
@@ -190,52 +187,31 @@ def fit_muscle(
     return _result(data, problem, rows, estimate(problem, rows), errors)
 
 
-def _choices(*, weights: str, errors: str, direction: str | None) -> None:
-    for name, value, allowed in (
-        ("weights", weights, ("force", "level")),
-        ("errors", errors, ("level", "plain")),
-        ("direction", direction, ("data", None)),
-    ):
-        if value not in allowed:
-            raise ParameterError(
-                f"{name} = {value!r} is not allowed: "
-                f"{' or '.join(repr(choice) for choice in allowed)}"
-            )
-
-
 def level_indices(data: ForceMap, levels: Sequence[float]) -> list[int]:
     """Indices of levels given as whole numbers (indices) or floats (pressures in Pa)."""
     chosen = np.asarray(levels)
     if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iuf":
-        raise ParameterError(
-            f"levels = {levels!r} is not allowed: a list of indices, or of pressures in Pa as "
-            "floats"
-        )
+        raise refused("levels", levels, "a list of indices, or of pressures in Pa as floats")
     if chosen.dtype.kind == "f":
         return data.level_indices(chosen.tolist())
     count = len(data.levels)
     if np.any((chosen < -count) | (chosen >= count)):
-        raise ParameterError(
-            f"levels = {chosen.tolist()} is not allowed: indices from 0 to {count - 1}; pressures "
-            "are given as floats, in Pa"
-        )
+        needed = f"indices from 0 to {count - 1}; pressures are given as floats, in Pa"
+        raise refused("levels", chosen.tolist(), needed)
     return sorted({int(index) % count for index in chosen})
 
 
 def _chosen(data: ForceMap, levels: Sequence[float] | None) -> Mask:
     level = data.level[data.used]
-    return (
-        np.ones(len(level), dtype=bool)
-        if levels is None
-        else np.isin(level, level_indices(data, levels))
-    )
+    if levels is None:
+        return np.ones(len(level), dtype=bool)
+    return np.isin(level, level_indices(data, levels))
 
 
 def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) -> tuple[Free, ...]:
     known = blank.parameters
     for name in names:
-        if name not in GEOMETRY:
-            raise ParameterError(f"free: {name!r} is not allowed: of {', '.join(GEOMETRY)}")
+        one_of("a name of free", name, GEOMETRY)
         if not has_effect(name, blank.model, blank.geometry):
             raise ParameterError(
                 f"free: {name!r} has no effect on the model {blank.model} with {blank.geometry} "
@@ -255,12 +231,10 @@ def _is_number(value: object) -> bool:
 def _tolerances(tolerance: Mapping[str, float] | None) -> dict[str, float]:
     allowed = (*GEOMETRY, *COEFFICIENTS)
     for name, value in (tolerance or {}).items():
-        if name not in allowed:
-            raise ParameterError(f"tolerance: {name!r} is not allowed: of {', '.join(allowed)}")
+        one_of("a name of tolerance", name, allowed)
         if not (_is_number(value) and value > 0.0):
-            raise ParameterError(
-                f"tolerance: {name} = {value!r} is not allowed: a positive number is needed "
-                "(infinite for no prior)"
+            raise refused(
+                f"tolerance: {name}", value, "a positive number is needed (infinite for no prior)"
             )
     return dict(tolerance or {})
 
@@ -298,22 +272,19 @@ def _problem(
     used = data.used
     pressure, _, force, level, way = data.used_rows()
     steps = way.astype(np.float64) if direction == "data" else np.zeros(len(force))
-    arrays: dict[str, Any] = {
-        "pressure": pressure,
-        "length": data.length[used],
-        "force": force,
-        "level": level,
-        "direction": steps,
-        "levels": data.levels,
-    }
     return Problem(
         blank=blank,
         moduli=moduli,
         free=free,
         known=known,
         noise=noise,
+        pressure=pressure,
+        length=data.length[used],
+        force=force,
+        level=level,
+        direction=steps,
         weight=np.ones(len(force)),
-        **arrays,
+        levels=data.levels,
     )
 
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
     from pamrs.rig import Muscle
 
-__all__ = ["FitParameter", "FitStatistics", "determination"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

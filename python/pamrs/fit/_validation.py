@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from pamrs.errors import FitError
 from pamrs.fit._estimate import Estimate, Problem, refitted
 
-__all__ = ["CrossValidation", "PressureErrors", "leave_one_out"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -63,11 +61,9 @@ class PressureErrors:
 
     def __repr__(self) -> str:
         left = f", {len(self.weak)} left out" if len(self.weak) else ""
-        worst = (
-            f", rms at most {100 * self.rms.max():.2f} % of the level's largest force"
-            if len(self.rms)
-            else ""
-        )
+        worst = ""
+        if len(self.rms):
+            worst = f", rms at most {100 * self.rms.max():.2f} % of the level's largest force"
         return f"PressureErrors({len(self.levels)} levels{left}{worst})"
 
     @classmethod

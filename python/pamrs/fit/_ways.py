@@ -9,8 +9,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["held_lengths", "series_ways", "strokes", "table_ways"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 

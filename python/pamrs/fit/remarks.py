@@ -21,19 +21,6 @@ if TYPE_CHECKING:
     from pamrs.fit._validation import CrossValidation
     from pamrs.rig import Muscle
 
-__all__ = [
-    "MODEL_WORDS",
-    "Pattern",
-    "cross_validation",
-    "friction_words",
-    "headline",
-    "limits",
-    "meaning",
-    "opening",
-    "residual_pattern",
-    "title",
-]
-
 Array = NDArray[np.float64]
 
 #: One sentence for each force model.

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from pamrs._writing import write_atomically
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit import remarks
 from pamrs.report.text import format_number, format_uncertain
@@ -305,8 +306,6 @@ def write_report(
     """Write :func:`render_html` to `path` and return the path; the file appears whole or not at
     all.
     """
-    from pamrs._writing import write_atomically
-
     return write_atomically(path, render_html(fit, comparison, command=command))
 
 
@@ -343,6 +342,4 @@ def write_figure(
     """Write :func:`render_png` to `path` and return the path; the file appears whole or not at
     all.
     """
-    from pamrs._writing import write_atomically
-
     return write_atomically(path, render_png(fit, comparison))

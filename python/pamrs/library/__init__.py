@@ -9,12 +9,11 @@ the muscle gives.
 
 from __future__ import annotations
 
-import difflib
 from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Final
 
-from pamrs.errors import ParameterError
+from pamrs.errors import ParameterError, meant
 from pamrs.library._entry import Entry, Fact, quantity, read_entry
 
 if TYPE_CHECKING:
@@ -69,11 +68,7 @@ def entry(name: str) -> Entry:
         If there is no such muscle.
     """
     if name not in _NAMES:
-        near = difflib.get_close_matches(str(name), _NAMES, n=1)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise ParameterError(
-            f"name = {name!r} is not in the library.{hint} There are: {', '.join(_NAMES)}"
-        )
+        raise ParameterError(f"name = {name!r} is not in the library; {meant(str(name), _NAMES)}")
     file = resources.files(__name__).joinpath(f"{name}.toml")
     return read_entry(file.read_text(encoding="utf-8"), source=f"{name}.toml")
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
+from pamrs._checks import one_of, refused
 from pamrs.errors import ParameterError
 from pamrs.units import parse_unit
 
@@ -128,9 +129,7 @@ def read_entry(text: str, source: str) -> Entry:
     try:
         document = tomllib.loads(text)
         if document.get("schema") != SCHEMA:
-            raise ParameterError(
-                f"schema = {document.get('schema')!r} is not allowed: it must be {SCHEMA!r}"
-            )
+            raise refused("schema", document.get("schema"), f"it must be {SCHEMA!r}")
         numbers = {**document["muscle"], **document["properties"]}
         without = [key for key, item in numbers.items() if not item.get("origin")]
         if without:
@@ -159,11 +158,7 @@ def read_entry(text: str, source: str) -> Entry:
 def _fact(item: Mapping[str, Any]) -> Fact:
     published = quantity(item["published"])
     relation = item.get("relation", "equals")
-    if relation not in RELATIONS:
-        raise ParameterError(
-            f"fact {item['name']!r}: relation = {relation!r} is not allowed: one of "
-            f"{', '.join(RELATIONS)}"
-        )
+    one_of(f"fact {item['name']!r}: relation", relation, RELATIONS)
     tolerance = 0.0
     if "tolerance" in item:
         relative = item["tolerance"]["unit"] == "%"

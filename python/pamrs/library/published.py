@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from pamrs import comparison
+from pamrs._checks import one_of
 from pamrs.comparison import Comparison, judge, verdicts
-from pamrs.errors import ParameterError
 from pamrs.library import Entry, Fact, entry, names
 from pamrs.library.evaluate import KINDS
 from pamrs.units import parse_unit
@@ -69,10 +69,7 @@ def table(rows: Iterable[Comparison], *, notes: bool = True, titles: bool = True
 
 
 def _compare(item: Entry, fact: Fact) -> Comparison:
-    if fact.kind not in KINDS:
-        raise ParameterError(
-            f"{item.name}: fact kind = {fact.kind!r} is not known: one of {', '.join(KINDS)}"
-        )
+    one_of(f"{item.name}: fact kind", fact.kind, KINDS)
     scale = parse_unit(fact.unit).scale
     return judge(
         item.name,

@@ -11,8 +11,6 @@ from pamrs.library import entry, names
 from pamrs.library.published import compare, table
 from pamrs.units import parse_unit, with_unit
 
-__all__ = ["description", "overview"]
-
 _UNITS: Final = {
     "rest_length": "mm",
     "rest_diameter": "mm",

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import as_said, plain, positive
+from pamrs._checks import as_said, one_of, plain, positive, refused
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
 from pamrs._views import COLOURS, Curve, Panels, View, over_time
 from pamrs.channels import channel_of, unit_of
@@ -27,7 +27,6 @@ from pamrs.recordings._case_keys import (
     FORMAT,
     LOG,
     OF_A_LOG,
-    SCHEMA,
     TOP,
 )
 from pamrs.recordings._doubts import ambient_of, limits_of
@@ -38,8 +37,6 @@ from pamrs.recordings._recording import Issue, OwnValue, Recording
 from pamrs.recordings.logs import Log, Series, TextFormat, check_readable, read_log
 from pamrs.rig import Parameter, Rig, effect_parameter, load_rig
 from pamrs.units import to_si
-
-__all__ = ["SCHEMA", "Case", "load_case", "model_and_case"]
 
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *LOG)
 _RIG: Final = "rig.toml"
@@ -483,15 +480,13 @@ def _own_value(name: str, entry: Any, rig: Rig | None) -> OwnValue:
         raise ParameterError(
             f"{entry!r} is not allowed: a table with value, unit and maybe error is needed"
         )
-    if error is not None and error not in ERRORS:
-        raise ParameterError(f"error = {error!r} is not allowed: {', '.join(ERRORS)}")
+    if error is not None:
+        one_of("error", error, ERRORS)
     if rig is None:  # said already
         return OwnValue(float(value), float(value))
     known = _known(rig, name)
     if not isinstance(unit, str):
-        raise ParameterError(
-            f"unit = {unit!r} is not allowed: a unit like {known.unit!r} is needed"
-        )
+        raise refused("unit", unit, f"a unit like {known.unit!r} is needed")
     found = OwnValue(to_si(float(value), unit, known.unit), known.value, error or "same")
     if error == "proportional" and known.value == 0.0:
         raise ParameterError("error = 'proportional' needs a value in the rig file that is not 0")

@@ -17,22 +17,6 @@ from pamrs.declared import (
 )
 from pamrs.recordings.calibration import KEYS
 
-__all__ = [
-    "CHANNEL",
-    "CLOCK",
-    "CONSTANT",
-    "DIALECT",
-    "ENTRY",
-    "ERRORS",
-    "FORMAT",
-    "LOG",
-    "OF_A_LOG",
-    "ROLES",
-    "SCHEMA",
-    "TOP",
-    "case_schema",
-]
-
 SCHEMA: Final = "pamrs.case/1"
 ROLES: Final = ("fit", "held_out")
 ERRORS: Final = ("same", "proportional", "none", "own")

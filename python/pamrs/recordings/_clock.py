@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from pamrs._files import MOST_ROWS
 from pamrs.errors import RecordingError
 
-__all__ = ["GAP", "Event", "Grid", "check_samples", "gaps", "lay_grid", "usual_interval"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -236,11 +234,9 @@ def _plain(interval: float, count: int) -> float:
     recording.
     """
     short = float(f"{interval:.4g}")
-    return (
-        short
-        if abs(short / interval - 1.0) * count < 0.5 * _ON_SAMPLE
-        else float(f"{interval:.9g}")
-    )
+    if abs(short / interval - 1.0) * count < 0.5 * _ON_SAMPLE:
+        return short
+    return float(f"{interval:.9g}")
 
 
 def _exact(placed: Array, kept: Array, jumps: Mask) -> Array:

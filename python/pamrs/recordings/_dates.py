@@ -11,8 +11,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["is_moment", "moments"]
-
 Array = NDArray[np.float64]
 
 _MOMENT: Final = re.compile(

@@ -19,18 +19,6 @@ from pamrs.units import bar_and_psi, from_si, parse_unit, to_si
 if TYPE_CHECKING:
     from pamrs.recordings._recording import Recording
 
-__all__ = [
-    "PRESSURES",
-    "Suspicion",
-    "ambient_of",
-    "assumed_unit",
-    "limits_of",
-    "made_gauge",
-    "subtracted",
-    "suspicions",
-    "unit_trouble",
-]
-
 Array = NDArray[np.float64]
 
 AMBIENT: Final = 101325.0

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from pamrs._stretches import stretches
 from pamrs.channels import CHANNELS
 
-__all__ = ["Fault", "find_faults"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

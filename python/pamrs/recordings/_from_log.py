@@ -25,8 +25,6 @@ from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_
 from pamrs.recordings.table import stem_of
 from pamrs.units import same_dimension, to_si
 
-__all__ = ["Clocks", "check_asked", "completed", "load_recordings", "recordings_of"]
-
 
 def load_recordings(
     path: str | os.PathLike[str],

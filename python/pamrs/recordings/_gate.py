@@ -17,8 +17,6 @@ import numpy as np
 from pamrs._files import MOST_BYTES, MOST_CELLS, MOST_COLUMNS, MOST_PIECE, MOST_ROWS
 from pamrs.errors import RecordingError
 
-__all__ = ["Gate", "Unpacking", "admit_arrow", "admit_matlab", "admit_numpy", "check_size"]
-
 _NUMBER: Final = 8
 """Bytes of a number as it is kept."""
 _DENSEST: Final = 100

@@ -21,8 +21,6 @@ from pamrs.recordings.logs import Log, Series, read_log, table_of
 from pamrs.recordings.table import Table, is_text, read_table, renamed, stem_of, thousands_of
 from pamrs.units import measured_from
 
-__all__ = ["load_recording"]
-
 HEADING: Final = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
 
 

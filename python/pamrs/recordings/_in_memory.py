@@ -13,8 +13,6 @@ from pamrs.channels import unit_of
 from pamrs.errors import CaseError, ParameterError, joined
 from pamrs.recordings._headed import HEADING
 
-__all__ = ["Arrays", "arrays_of", "is_table"]
-
 Array = NDArray[np.float64]
 _NUMBERS = "biuf"  # kinds of arrays that are numbers
 _DATES = "mM"  # kinds that are times

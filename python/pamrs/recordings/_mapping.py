@@ -19,8 +19,6 @@ from pamrs.recordings._doubts import unit_trouble
 from pamrs.recordings.calibration import Calibration, read_calibration
 from pamrs.units import measured_from, parse_unit, to_si
 
-__all__ = ["Clock", "Source", "read_clock", "read_sources"]
-
 Array = NDArray[np.float64]
 
 

@@ -23,8 +23,6 @@ from pamrs.recordings.logs import Series, Written, understood_unit
 from pamrs.rig import Rig
 from pamrs.units import parse_unit, same_dimension
 
-__all__ = ["Match", "Open", "channels_of", "matched", "words_of"]
-
 #: What says that a series was commanded, and what, that it was measured.
 _COMMANDED: Final = frozenset(COMMANDED.split())
 _MEASURED: Final = frozenset(MEASURED.split())

@@ -35,8 +35,6 @@ from pamrs.recordings.table import stem_of
 from pamrs.rig import Rig
 from pamrs.units import parse_unit, same_dimension
 
-__all__ = ["Listed", "LogProposal", "Proposal", "propose"]
-
 _TRIALS: Final = (
     ("trial", "run", "test", "segment", "cycle", "versuch", "experiment", "lift")
     + ("part",)  # of logs that begin again with their headings

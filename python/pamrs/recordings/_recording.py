@@ -31,13 +31,6 @@ from pamrs.rig import full_name, named_entries
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = [
-    "Issue",
-    "Recording",
-    "assemble",
-    "judged",
-]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

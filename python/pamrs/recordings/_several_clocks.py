@@ -23,8 +23,6 @@ from pamrs.recordings._clock import (
 from pamrs.recordings._recording import Issue, Recording, assemble, judged
 from pamrs.recordings._stamps import Rows, Ticks, filled_rows, spread, unwound
 
-__all__ = ["SLOW", "UNTOLD", "Sampled", "on_one_clock", "recording_of", "sampled"]
-
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
 #: A diagnosis can do without them: they need not last as long as the others.
 SLOW: Final = frozenset(with_trait("slow"))

@@ -14,8 +14,6 @@ from pamrs.recordings._clock import Array
 from pamrs.recordings._several_clocks import Sampled
 from pamrs.recordings._stamps import Ticks
 
-__all__ = ["Cut", "Part", "Split", "Stretch", "parts", "read_split", "stretches_of"]
-
 _ALLOWED: Final = "'clock', { gap = SECONDS } or { column = \"...\" }"
 _FEWEST: Final = 2  # samples of a part; what is shorter is left out
 _MOST: Final = 10_000

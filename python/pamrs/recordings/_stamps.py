@@ -14,19 +14,6 @@ from numpy.typing import NDArray
 from pamrs.recordings._clock import GAP
 from pamrs.units import parse_unit
 
-__all__ = [
-    "CLOCK_WORDS",
-    "TIME_UNITS",
-    "Rows",
-    "Ticks",
-    "counted_on",
-    "filled_rows",
-    "spread",
-    "ticks",
-    "unit_of_stamps",
-    "unwound",
-]
-
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 

@@ -10,16 +10,6 @@ from pamrs.errors import RecordingError
 from pamrs.recordings._dates import is_moment
 from pamrs.recordings.table import NO_VALUE, split_rows, usual_width
 
-__all__ = [
-    "BESIDE_COMMAS",
-    "Dialect",
-    "check_marks",
-    "decimal_of",
-    "dialect_of",
-    "is_number",
-    "is_useful",
-]
-
 _PAIRS: Final = tuple((mark, decimal) for mark in ("\t", ";", ",", "|", " ") for decimal in ".,")
 _LINES: Final = 400  # in which the dialect is looked for
 #: Numbers beside others whose decimal mark is the comma: points part thousands.

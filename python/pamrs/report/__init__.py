@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from pamrs._writing import write_atomically
 from pamrs.findings import Findings
 
 __all__ = ["render_html", "write_figure", "write_page", "write_report"]
@@ -19,14 +20,11 @@ def render_html(diagnosis: Findings) -> str:
 
 def write_report(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
     """Write the HTML report to `path` and return the path."""
-    from pamrs._writing import write_atomically
-
     return write_atomically(path, render_html(diagnosis))
 
 
 def write_page(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
     """Write the first screen of the report, one page of A4 as PDF, and return the path."""
-    from pamrs._writing import write_atomically
     from pamrs.report.pictures import one_page_pdf
 
     return write_atomically(path, one_page_pdf(diagnosis))
@@ -34,7 +32,6 @@ def write_page(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
 
 def write_figure(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
     """Write the one-picture summary, a PNG of 1600 x 1000 pixels, and return the path."""
-    from pamrs._writing import write_atomically
     from pamrs.report.pictures import summary_png
 
     return write_atomically(path, summary_png(diagnosis))

@@ -21,8 +21,6 @@ from pamrs.report.page import render_page
 from pamrs.report.text import format_number, label, miss
 from pamrs.rig import Rig
 
-__all__ = ["chain_svg", "draw_chain"]
-
 COLUMN, BOX, LINE, PAD, GAP = 186.0, 134.0, 17.0, 14.0, 34.0
 """Distance of columns, width of a box, height of a line of text, margin of a frame and distance of
 rows [px]."""

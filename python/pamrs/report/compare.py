@@ -11,8 +11,6 @@ from pamrs.report import text as words
 from pamrs.report.page import render_page
 from pamrs.units import with_unit
 
-__all__ = ["comparison_html", "comparison_text", "tables"]
-
 _NOTHING = "-"
 
 

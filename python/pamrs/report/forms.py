@@ -9,8 +9,6 @@ from collections.abc import Mapping, Sequence
 from pamrs.effects import CLOSURE_TERMS, EFFECTS, WORDS, ClosureTerm
 from pamrs.findings import Form
 
-__all__ = ["form_sentence"]
-
 _SPOKEN_SHARE = 0.05  # share of the form from which a kind of dependence is put into words
 _UNITS = {  # factors and units in which sizes are told
     "N m": ((1.0, "N m"),),
@@ -125,10 +123,8 @@ def _percent(share: float) -> str:
 
 def _listed(words: Sequence[str]) -> str:
     """Words with commas, the last with ``and``."""
-    return (
-        words[0]
-        if len(words) == 1
-        else f"{', '.join(words[:-1])} and {words[-1]}"
-        if words
-        else "nothing"
-    )
+    if len(words) == 1:
+        return words[0]
+    if words:
+        return f"{', '.join(words[:-1])} and {words[-1]}"
+    return "nothing"

@@ -27,8 +27,6 @@ from pamrs.report import text as words
 from pamrs.report.chain import chain_svg
 from pamrs.report.page import render_page
 
-__all__ = ["render"]
-
 TRACES = 3
 """Channels of a recording that are drawn."""
 _LEAST_CONDITION = 0.005  # share of the excess below which a condition is not told: 0 %

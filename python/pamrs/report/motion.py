@@ -12,7 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pamrs._checks import refused
 from pamrs._views import decimate
+from pamrs._writing import write_atomically
 from pamrs.channels import channel_of, dotted, laboratory_unit, recorded_as
 from pamrs.errors import ParameterError
 from pamrs.report.figures import COLOURS, STYLE, png_bytes
@@ -22,8 +24,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from pamrs.simulation import Simulation
-
-__all__ = ["channels_png", "write_animation"]
 
 Array = NDArray[np.float64]
 
@@ -201,8 +201,6 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
     import tempfile
     from pathlib import Path as File
 
-    from pamrs._writing import write_atomically
-
     if not result.under("joint_angle") and "length" not in result:
         raise ParameterError(f"the rig {result.rig.name!r} has no arm and no load to draw")
     if result.time.size < 2:
@@ -210,15 +208,14 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
             f"{result.time.size} sample is not enough to draw a motion: two at least"
         )
     if not (math.isfinite(speed) and speed > 0.0):
-        raise ParameterError(f"speed = {speed} is not allowed: a finite number above zero")
+        raise refused("speed", speed, "a finite number above zero")
     if not _SLOWEST <= speed <= 1.0 / _SLOWEST:
         raise ParameterError(
             f"speed = {speed:g} is not allowed: from {_SLOWEST:g} to {1.0 / _SLOWEST:g}"
         )
     duration = float(result.time[-1] - result.time[0]) / speed
-    delay = max(
-        2, math.ceil(100.0 * duration / _FRAMES)
-    )  # hundredths of a second: what a GIF knows, and players keep
+    # hundredths of a second: what a GIF knows, and players keep
+    delay = max(2, math.ceil(100.0 * duration / _FRAMES))
     shown = np.arange(0.0, 100.0 * duration + 1e-9, delay) * 0.01 * speed + result.time[0]
     frames = np.clip(np.searchsorted(result.time, shown - 1e-9), 0, result.time.size - 1)
     with mpl.rc_context(STYLE), tempfile.TemporaryDirectory() as folder:
@@ -227,9 +224,8 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
         scene = _Scene(axes, result, float(figure.get_size_inches()[0]))
         motion = FuncAnimation(figure, scene.draw, frames=frames.tolist(), blit=False)
         picture = File(folder) / "motion.gif"
-        rate: Any = (
-            100.0 / delay * (1.0 - 1e-9)
-        )  # a hair slow: the writer cuts the delay to whole milliseconds
+        # a hair slow: the writer cuts the delay to whole milliseconds
+        rate: Any = 100.0 / delay * (1.0 - 1e-9)
         motion.save(picture, writer=PillowWriter(fps=rate))
         return write_atomically(path, picture.read_bytes())
 

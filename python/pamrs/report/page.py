@@ -9,8 +9,6 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-__all__ = ["render_page"]
-
 
 def _version() -> str:
     try:

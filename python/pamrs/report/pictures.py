@@ -23,8 +23,6 @@ from pamrs.report.figures import (
 )
 from pamrs.rig import Rig
 
-__all__ = ["one_page_pdf", "summary_png"]
-
 
 def summary_png(diagnosis: Findings) -> bytes:
     """One picture: the chain, the free run of the worst recording, and the probabilities.

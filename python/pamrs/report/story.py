@@ -18,8 +18,6 @@ from pamrs.findings import (
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
-__all__ = ["Rival", "bench_value", "facts", "headline", "rivals", "title", "to_do"]
-
 LONGEST = 20
 """Words of a title at most."""
 MOST_RIVALS = 7

@@ -11,8 +11,6 @@ from pamrs.report import story
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
-__all__ = ["notebook", "summary"]
-
 _ASCII: Final = str.maketrans({"°": "deg", "−": "-", "–": "-", "×": "x"})
 """Signs that a terminal may lack."""
 

@@ -28,70 +28,6 @@ from pamrs.findings import (
 from pamrs.rig.schema import BLOCKS
 from pamrs.units import with_unit
 
-__all__ = [
-    "beside_held",
-    "blocks_label",
-    "BUDGET_NOTE",
-    "MENDED",
-    "SETTLED",
-    "YOURS",
-    "budget_sentence",
-    "budget_sentences",
-    "budgets",
-    "chance_of",
-    "chance_of_named",
-    "considered_sentence",
-    "data_sentence",
-    "down_to",
-    "display_unit",
-    "effect_heading",
-    "effect_name",
-    "effect_title",
-    "format_interval",
-    "format_number",
-    "format_probability",
-    "format_share",
-    "format_uncertain",
-    "hypothesis_label",
-    "is_named",
-    "is_number",
-    "is_open",
-    "judged_place",
-    "kept_details",
-    "kept_sentence",
-    "label",
-    "leading",
-    "located_block",
-    "left_out_sentence",
-    "mended_sentence",
-    "model_name",
-    "miss",
-    "miss_of",
-    "name_chance",
-    "noise_alone",
-    "not_judged_words",
-    "open_chances",
-    "off_sentence",
-    "ranked_probabilities",
-    "sentence_of",
-    "shown_errors",
-    "set_label",
-    "sized",
-    "span95",
-    "spoken_block",
-    "spoken_name",
-    "term_label",
-    "told_apart",
-    "told_blocks",
-    "told_pairs",
-    "told_terms",
-    "told_probabilities",
-    "undetermined",
-    "with_article",
-    "worse_sentence",
-    "worst_mismatch",
-]
-
 _LABELS = {
     "none": "nothing missing",
     "parameters": "parameters in tolerance",
@@ -342,11 +278,9 @@ def kept_sentence(kept: Unexplained) -> str:
     """What is left in a block: ``the residual of the arm is 15 times the noise level (0.4 deg) on
     held-out recordings, and no listed effect explains it``.
     """
-    why = (
-        "no listed effect explains it"
-        if kept.verdict == "unlisted"
-        else "what is named does not explain it"
-    )
+    why = "what is named does not explain it"
+    if kept.verdict == "unlisted":
+        why = "no listed effect explains it"
     times = format_number(kept.noises, 2, unicode=False)
     on = {"held_out": " on held-out recordings", "fit": " on the fitted recordings"}
     return (
@@ -721,11 +655,9 @@ def told_apart(sets: list[list[str]], probabilities: Mapping[str, float]) -> str
     """
     names = {name for s in sets for name in s}
     told = [_answer([_spread(n, names) for n in s], chance_of(probabilities, s)) for s in sets]
-    return (
-        f"{told[0]} from {told[1]}"
-        if len(told) == 2
-        else f"{', '.join(told[:-1])} and {told[-1]} apart"
-    )
+    if len(told) == 2:
+        return f"{told[0]} from {told[1]}"
+    return f"{', '.join(told[:-1])} and {told[-1]} apart"
 
 
 def _spread(name: str, others: Collection[str]) -> str:

@@ -7,8 +7,6 @@ import math
 from pamrs.findings import Misread
 from pamrs.units import bar_and_psi
 
-__all__ = ["misread_advice", "misread_sentence"]
-
 
 def _names(entry: Misread) -> str:
     *first, last = entry.channels
@@ -44,15 +42,13 @@ def misread_sentence(entry: Misread) -> str:
 
 def misread_advice(entry: Misread) -> str:
     """What to do about it."""
-    how = (
-        "subtract the ambient pressure"
-        if entry.likely == "absolute"
-        else "give the values as they are, as gauge pressures"
-        if entry.offset
-        else f"write {entry.likely}"
-        if math.isnan(entry.gain)
-        else f"write {entry.likely}, or with its calibration scale = {entry.gain:.4f},"
-    )
+    how = f"write {entry.likely}"
+    if entry.likely == "absolute":
+        how = "subtract the ambient pressure"
+    elif entry.offset:
+        how = "give the values as they are, as gauge pressures"
+    elif not math.isnan(entry.gain):
+        how += f", or with its calibration scale = {entry.gain:.4f},"
     return (
         f"No physics was judged, since a wrong unit looks like missing physics: {how} for "
         f"{_names(entry)} (in the heading, or in case.toml), or check the sensor where the log "

@@ -28,8 +28,6 @@ from pamrs.report.text import (
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
-__all__ = ["unknown_volumes", "verdict"]
-
 _MENDED = 0.98  # share of a channel's error from which a wrong value is not said to mend it
 
 
@@ -160,11 +158,9 @@ def _closed(diagnosis: Findings, by: str, case: Case) -> str:
 
 
 def _proof(case: Case) -> str:
-    return (
-        "held-out recordings"
-        if case.held_out and case.fit
-        else "the fitted recording (no other was given)"
-    )
+    if case.held_out and case.fit:
+        return "held-out recordings"
+    return "the fitted recording (no other was given)"
 
 
 def _mistaken(diagnosis: Findings, case: Case) -> str:

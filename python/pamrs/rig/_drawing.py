@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from pamrs.rig._rig import Rig
 
-__all__ = ["draw_blocks", "draw_forces"]
-
 _LEVELS: Final = 4  # pressures of the lines
 
 

@@ -15,6 +15,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig._reader import Content, read_model
+from pamrs.rig._switching import kind_of_entry
 from pamrs.rig._writer import entry_text, toml_text
 from pamrs.rig.schema import BLOCKS, Key
 from pamrs.units import from_si, to_si
@@ -90,28 +91,24 @@ def _edit_effects(document: Any, before: list[Any], after: Any) -> None:
     """Bring the list of effects from one content to another: those that are in both with new
     numbers, the others gone or added at the end; written whole where their order is another.
     """
-    wanted = [_identity(effect) for effect in after]
-    there = [_identity(effect) for effect in before if _identity(effect) in wanted]
+    wanted = [kind_of_entry(effect) for effect in after]
+    there = [kind_of_entry(effect) for effect in before if kind_of_entry(effect) in wanted]
     tables: Any = document.get("effects", [])
     if wanted[: len(there)] != there or not isinstance(tables, tomlkit.items.AoT):
         document.pop("effects", None)
         document.append("effects", after)
         return
     for index in reversed(range(len(before))):
-        if _identity(before[index]) not in wanted:
+        if kind_of_entry(before[index]) not in wanted:
             del tables[index]
-    known = {_identity(effect): effect["parameters"] for effect in before}
+    known = {kind_of_entry(effect): effect["parameters"] for effect in before}
     for effect, table in zip(after, tables, strict=False):
         given = table.setdefault("parameters", tomlkit.table())
         for name, value in effect["parameters"].items():
-            if known[_identity(effect)].get(name) != value.unwrap():
+            if known[kind_of_entry(effect)].get(name) != value.unwrap():
                 given[name] = value
     for effect in after[len(there) :]:
         tables.append(effect)
-
-
-def _identity(effect: Mapping[str, Any]) -> tuple[str, str, str]:
-    return effect["id"], effect.get("at", ""), effect.get("form", "")
 
 
 def _key_at(path: tuple[str, ...]) -> Key | None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._checks import refused
 from pamrs.errors import ParameterError
 
 Array = NDArray[np.float64]
@@ -56,7 +57,7 @@ def compiled_law(
     low, high = _range("pressure", pressure, -101_325.0, _HIGHEST, "Pa")
     short, far = _range("contraction", contraction, -1.0, 1.0, "")
     if not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise ParameterError(f"tolerance = {tolerance!r} is not allowed: a positive number")
+        raise refused("tolerance", tolerance, "a positive number")
     size = list(_FIRST)
     while True:
         axes = np.linspace(low, high, size[0]), np.linspace(short, far, size[1])
@@ -88,7 +89,7 @@ def _range(
         low = high = math.nan
     if not lowest <= low < high <= highest:
         what = f"two numbers from {lowest:g} to {highest:g} {unit}".rstrip()
-        raise ParameterError(f"{name} = {given!r} is not allowed: {what}, the first one smaller")
+        raise refused(name, given, f"{what}, the first one smaller")
     return low, high
 
 

@@ -55,7 +55,7 @@ def read_model_error(reader: Reader, raw: Any, model: Mapping[str, Any]) -> dict
     if raw is None:
         return {}
     if not isinstance(raw, Mapping):
-        reader.problem(f"model_error = {raw!r} is not allowed: a table [model_error] is needed")
+        reader.refuse("model_error", raw, "a table [model_error] is needed")
         return {}
     found = {}
     for name, entry in _flat(raw):
@@ -96,13 +96,13 @@ def _value(reader: Reader, name: str, entry: Any) -> dict[str, float] | None:
         told = _TEXT.fullmatch(entry) if isinstance(entry, str) else None
         number, unit = (_number(told[1]), told[2]) if told else (None, None)
     if number is None or not isinstance(unit, str):
-        reader.problem(f"{label} = {entry!r} is not allowed: a text like {like} is needed")
+        reader.refuse(label, entry, f"a text like {like} is needed")
         return None
     if unit == "%":
         share = reader.scalar(label, "1", number, "%", 0.0, 1.0)
         return None if share is None else {"share": share}
     if not si_unit:
-        reader.problem(f"{label} = {entry!r} is not allowed: of a block a share like {like}")
+        reader.refuse(label, entry, f"of a block a share like {like}")
         return None
     size = reader.scalar(label, si_unit, number, unit, 0.0, 1e300, difference=True)
     return None if size is None else {"size": size}

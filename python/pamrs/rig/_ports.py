@@ -109,9 +109,8 @@ def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:
         way = [ends["from"], qualified("valve", name), ends["to"]]
         if ends["to"] in inner:
             way.append(inner[ends["to"]]["to"])
-        lines.append(
-            way if way[-1] == "ambient" else [*way, "ambient"]
-        )  # a valve also vents what it fills
+        # a valve also vents what it fills
+        lines.append(way if way[-1] == "ambient" else [*way, "ambient"])
     lines += [[ends["from"], name, ends["to"]] for name, ends in inner.items() if ends["from"]]
     lines = [[fronts[way[0]], *way] if way[0] in fronts else way for way in lines]
     for way in lines:
@@ -163,6 +162,10 @@ class _Connector:
         self.ports: Ports = {block: {name: {} for name in self.tables[block]} for block in PORTS}
         self.problems: list[str] = []
 
+    def note(self, text: str) -> None:
+        """Note something wrong."""
+        self.problems.append(text)
+
     # --------------------------------------------------------------------- one port
 
     def settle(
@@ -193,15 +196,13 @@ class _Connector:
         if len(short) == 1:
             return short[0]
         if short:
-            self.problems.append(f"{label} = {text!r} is not clear: {' or '.join(short)}")
+            self.note(f"{label} = {text!r} is not clear: {' or '.join(short)}")
         elif text in ("ambient", "base", *self.all_of(BLOCKS)):
-            self.problems.append(f"{label} = {text!r} is not allowed: one of {', '.join(allowed)}")
+            self.note(f"{label} = {text!r} is not allowed: one of {', '.join(allowed)}")
         else:
             short = [name for kind in port.kinds for name in self.tables[kind] if name]
             what = " and no ".join([*port.kinds, *port.words])
-            self.problems.append(
-                f"{label} = {text!r} names no {what}{near_name(text, allowed, short)}"
-            )
+            self.note(f"{label} = {text!r} names no {what}{near_name(text, allowed, short)}")
         return None
 
     def missing(self, label: str, port: str, kinds: list[str]) -> None:
@@ -211,12 +212,12 @@ class _Connector:
         if there:
             unfed = label.partition(".")[0] == "line" and port == "from" and self.tables["valve"]
             other = ", or lead a valve to it" if unfed else ""
-            self.problems.append(
+            self.note(
                 f"{label}.{port} is missing: the rig has {' and '.join(there)}; say which{other}"
             )
         else:
             needed = " or ".join(f"[{kind}]" for kind in kinds)
-            self.problems.append(f"the block [{label}] needs the block {needed}, which is missing")
+            self.note(f"the block [{label}] needs the block {needed}, which is missing")
 
     def all_of(self, kinds: Iterable[str]) -> list[str]:
         """Blocks of some kinds in full."""
@@ -248,21 +249,19 @@ class _Connector:
             if "inlet" not in self.given.get(label, {}):
                 continue
             if (kind := kind_of("supply", table)) != "regulator":
-                self.problems.append(
-                    f"{label}.inlet is not allowed with {kind!r}: only with regulator"
-                )
+                self.note(f"{label}.inlet is not allowed with {kind!r}: only with regulator")
                 continue
             front = self.settle("supply", name, "inlet", ())
             if front is None:
                 continue
             other = self.tables["supply"][bare("supply", front)]
             if front == label:
-                self.problems.append(
+                self.note(
                     f"{label}.inlet = {front!r} is not allowed: it is the regulator itself; "
                     "another supply is needed"
                 )
             elif kind_of("supply", other) == "regulator":
-                self.problems.append(
+                self.note(
                     f"{label}.inlet = {front!r} is not allowed: it is a regulator; a tank or a "
                     "constant supply is needed"
                 )
@@ -295,7 +294,7 @@ class _Connector:
             self.two_ends("valve", name, start, end)
             fed = next((line for line in own if qualified("line", line) == end), None)
             if fed is not None and own[fed] is not None:
-                self.problems.append(
+                self.note(
                     f"{qualified('valve', name)}.to = {end!r} is not allowed: {end}.from = "
                     f"{own[fed]!r}, so that no valve feeds it"
                 )
@@ -311,10 +310,9 @@ class _Connector:
             if "from" not in self.given.get(label, {}):
                 if label in ends:
                     self.ports["line"][name]["from"] = ""
-                    if (
-                        kind_of("line", table) == "orifice" and table.get("inlet_volume") == 0.0
-                    ):  # its pressure would have no rate
-                        self.problems.append(
+                    # its pressure would have no rate
+                    if kind_of("line", table) == "orifice" and table.get("inlet_volume") == 0.0:
+                        self.note(
                             f"{label}.inlet_volume = 0 m3 is not allowed: more is needed between "
                             "an orifice and the valves that feed it"
                         )
@@ -325,12 +323,12 @@ class _Connector:
             start = self.settle("line", name, "from", (self.same("supply", name), alone))
             self.two_ends("line", name, start, end)
             if start is not None and table.get("inlet_volume"):
-                self.problems.append(
+                self.note(
                     f"{label}.inlet_volume = {table['inlet_volume']:g} m3 is not allowed: {label} "
                     f"begins at {start}, and only an inlet that valves feed has a volume of its own"
                 )
             if start is not None and table.get("pressure_zero"):
-                self.problems.append(
+                self.note(
                     f"{label}.pressure_zero = {table['pressure_zero']:g} Pa is not allowed: "
                     f"{label} begins at {start}, and only an inlet that valves feed has a gauge"
                 )
@@ -338,7 +336,7 @@ class _Connector:
     def two_ends(self, block: str, name: str, start: str | None, end: str | None) -> None:
         """Note a valve or line that leads back to where it begins."""
         if start is not None and start == end:
-            self.problems.append(
+            self.note(
                 f"{qualified(block, name)}: from and to are both {start}; two different ends are "
                 "needed"
             )
@@ -359,25 +357,21 @@ class _Connector:
             )
             own = qualified("transmission", name)
             if joint == "load" and name in transmissions:
-                self.problems.append(
-                    f"the block [{own}] is not allowed: {label} pulls on the load, straight"
-                )
+                self.note(f"the block [{own}] is not allowed: {label} pulls on the load, straight")
             free = [
                 qualified("joint", j)
                 for j, table in self.tables["joint"].items()
                 if kind_of("joint", table) == "free"
             ]
             if joint in free and name not in transmissions:
-                self.problems.append(
-                    f"{label} pulls on {joint}, which is free: the block [{own}] is missing"
-                )
+                self.note(f"{label} pulls on {joint}, which is free: the block [{own}] is missing")
         for name in transmissions:
             if name not in self.tables["muscle"]:
                 whose = "without a name, as no muscle is: name it as its muscle"
                 if name:
                     hint = near_name(name, filter(None, self.tables["muscle"]))
                     whose = f"named after no muscle{hint}"
-                self.problems.append(f"the block [{qualified('transmission', name)}] is {whose}")
+                self.note(f"the block [{qualified('transmission', name)}] is {whose}")
 
     # ------------------------------------------------------------------------- arm
 
@@ -385,11 +379,9 @@ class _Connector:
         """Note blocks that need each other or exclude each other."""
         for block, needs in _NEEDS:
             if self.tables[block] and not self.tables[needs]:
-                self.problems.append(
-                    f"the block [{block}] needs the block [{needs}], which is missing"
-                )
+                self.note(f"the block [{block}] needs the block [{needs}], which is missing")
         if self.tables["load"] and (self.tables["joint"] or self.tables["arm"]):
-            self.problems.append(
+            self.note(
                 "the block [load] does not go with [joint] and [arm]: a rig has one or the others"
             )
 
@@ -398,25 +390,23 @@ class _Connector:
         links, joints = self.tables["link"], self.tables["joint"]
         kind = kind_of("arm", self.tables["arm"][""]) if self.tables["arm"] else None
         if links and not self.tables["arm"]:
-            self.problems.append(
+            self.note(
                 "the block [link] needs the block [arm] with kind = 'planar', which is missing"
             )
         if kind == "one_link":
             if links:
                 names = ", ".join(self.all_of(["link"]))
-                self.problems.append(
+                self.note(
                     f"arm.kind = 'one_link' is not allowed with {names}: 'planar' is needed for "
                     "links"
                 )
             if len(joints) > 1:
-                self.problems.append(
+                self.note(
                     f"arm.kind = 'one_link' is not allowed with the joints {', '.join(joints)}: "
                     "one joint, or 'planar' with a link each"
                 )
         elif kind == "planar" and not links:
-            self.problems.append(
-                "arm.kind = 'planar' needs a block [link] for each joint, and there is none"
-            )
+            self.note("arm.kind = 'planar' needs a block [link] for each joint, and there is none")
         elif kind == "planar":
             self.joints_of_links()
             self.chain()
@@ -428,7 +418,7 @@ class _Connector:
             label = qualified("link", name)
             joint = self.settle("link", name, "joint", (self.same("joint", name),))
             if joint in moved:
-                self.problems.append(
+                self.note(
                     f"{label}.joint = {joint!r} is not allowed: {joint} moves {moved[joint]} "
                     "already"
                 )
@@ -450,7 +440,7 @@ class _Connector:
             on = self.settle("link", name, "on", (before,))
             before = label
             if on in carries:
-                self.problems.append(
+                self.note(
                     f"{label}.on = {on!r} is not allowed: {on} carries "
                     f"{qualified('link', carries[on])} already"
                 )
@@ -464,7 +454,7 @@ class _Connector:
             place = qualified("link", carries[place])
         around = [qualified("link", name) for name in self.tables["link"] if name not in ordered]
         if around:
-            self.problems.append(
+            self.note(
                 f"{', '.join(around)}: each is on another of them, in a circle; one link of an arm "
                 "is on the base"
             )

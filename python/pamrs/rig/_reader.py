@@ -105,6 +105,10 @@ class Reader:
         """Note a problem."""
         self.problems.append(text)
 
+    def refuse(self, name: str, value: object, needed: str) -> None:
+        """Note a value that is not allowed, and what is needed."""
+        self.problem(f"{name} = {_shown(value)} is not allowed: {needed}")
+
     def unknown_keys(self, prefix: str, given: Iterable[str], allowed: Iterable[str]) -> None:
         """Note every key that is not allowed, with what is near to it."""
         names = list(allowed)
@@ -116,17 +120,15 @@ class Reader:
         """A whole rig file."""
         self.unknown_keys("", document, [*_TOP, *BLOCKS])
         if document.get("schema") != SCHEMA:
-            self.problem(
-                f"schema = {_shown(document.get('schema'))} is not allowed: {SCHEMA!r} is needed"
-            )
+            self.refuse("schema", document.get("schema"), f"{SCHEMA!r} is needed")
         name = document.get("name", "rig")
         if not isinstance(name, str) or not name.strip():
-            self.problem(f"name = {_shown(name)} is not allowed: a text is needed")
+            self.refuse("name", name, "a text is needed")
             name = "rig"
         name = shown(name)[:MOST_NAME]
         case = document.get("case", "")
         if not isinstance(case, str):
-            self.problem(f"case = {_shown(case)} is not allowed: the path of a case is needed")
+            self.refuse("case", case, "the path of a case is needed")
             case = ""
         self.whole = set(document) <= {*_TOP, *BLOCKS}
         model: dict[str, Any] = {"name": name, **({"case": case} if case else {})}
@@ -150,7 +152,7 @@ class Reader:
         if raw is None:
             return {}
         if not isinstance(raw, Mapping):
-            self.problem(f"limits = {_shown(raw)} is not allowed: a table is needed")
+            self.refuse("limits", raw, "a table is needed")
             return {}
         self.unknown_keys("limits.", raw, (key.name for key in LIMITS))
         found = {
@@ -168,7 +170,7 @@ class Reader:
                 self.whole = False
             return None
         if not isinstance(raw, Mapping):
-            self.problem(f"{block} = {_shown(raw)} is not allowed: a table [{block}] is needed")
+            self.refuse(block, raw, f"a table [{block}] is needed")
             self.whole = False
             return None
         names = _block_names(block, raw)
@@ -217,19 +219,13 @@ class Reader:
             if isinstance(inner, Mapping):
                 self.unknown_keys(f"{label}.{group}.", inner, members)
             elif inner is not None:
-                self.problem(
-                    f"{label}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} "
-                    "as a table"
-                )
+                self.refuse(f"{label}.{group}", inner, f"give {', '.join(members)} as a table")
         for port in allowed:
             other = table.get(port)
             if isinstance(other, str):
                 self.ports.setdefault(label, {})[port] = other
             elif other is not None:
-                self.problem(
-                    f"{label}.{port} = {_shown(other)} is not allowed: the name of a block is "
-                    "needed"
-                )
+                self.refuse(f"{label}.{port}", other, "the name of a block is needed")
         keys = keys_of(block, table)
         for key in BLOCKS[block]:
             if key in keys or _dig(table, key.where) is None:
@@ -312,11 +308,9 @@ class Reader:
             )
             if given and self.whole:
                 label = qualified("sensors", name)
-                needs = (
-                    'a [load] with kind = "mass" is needed'
-                    if not moves
-                    else "it belongs in [sensors], without a name"
-                )
+                needs = "it belongs in [sensors], without a name"
+                if not moves:
+                    needs = 'a [load] with kind = "mass" is needed'
                 self.problem(f"{label}.length_zero is not allowed: {needs}")
             table.pop("length_zero", None)
 
@@ -333,10 +327,7 @@ class Reader:
             return list(key.default) if isinstance(key.default, tuple) else key.default
         if key.kind == "choice":
             if raw not in key.choices:
-                self.problem(
-                    f"{label} = {_shown(raw)} is not allowed: one of "
-                    f"{', '.join(map(repr, key.choices))}"
-                )
+                self.refuse(label, raw, f"one of {', '.join(map(repr, key.choices))}")
                 return None
             return raw
         bare_allowed = key.kind == "count" or bool(key.path)
@@ -367,9 +358,7 @@ class Reader:
         if not isinstance(raw, Mapping):
             if bare_allowed:
                 return raw, key.unit, {}
-            self.problem(
-                f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {key.unit!r} }}"
-            )
+            self.no_unit(label, raw, key.unit)
             return None, key.unit, {}
         self.unknown_keys(f"{label}.", raw, _QUANTITY)
         if "value" not in raw:
@@ -380,6 +369,12 @@ class Reader:
             self.problem(f"{label}.unit is missing: a unit like {key.unit!r} is needed")
             return None, key.unit, {}
         return raw["value"], unit, raw
+
+    def no_unit(self, label: str, raw: Any, unit: str) -> None:
+        """Note a number without the table that gives its unit."""
+        self.problem(
+            f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {unit!r} }}"
+        )
 
     def scalar(
         self,
@@ -397,7 +392,7 @@ class Reader:
         what = "a whole number" if whole else "a finite number"
         if isinstance(number, bool) or not isinstance(number, (int, float)):
             needed = what if whole else "a number"
-            self.problem(f"{label} = {_shown(number)} is not allowed: {needed} is needed")
+            self.refuse(label, number, f"{needed} is needed")
             return None
         try:
             value = to_si(float(number), unit, si_unit, difference=difference)
@@ -419,7 +414,7 @@ class Reader:
     def vector(self, label: str, key: Key, numbers: Any, unit: str) -> list[float] | None:
         """A list of numbers in SI."""
         if not isinstance(numbers, list) or not numbers:
-            self.problem(f"{label} = {_shown(numbers)} is not allowed: a list of numbers is needed")
+            self.refuse(label, numbers, "a list of numbers is needed")
             return None
         values = [
             self.scalar(f"{label}[{i}]", key.unit, number, unit, key.lower, key.upper)
@@ -436,7 +431,7 @@ class Reader:
                 self.problem(f"{label}.error is not allowed: a list is the same in each recording")
         unknown = extra.get("unknown", False)
         if not isinstance(unknown, bool):
-            self.problem(f"{label}.unknown = {_shown(unknown)} is not allowed: true or false")
+            self.refuse(f"{label}.unknown", unknown, "true or false")
             return
         if unknown:
             if "tol" in extra:
@@ -452,9 +447,11 @@ class Reader:
     def of_each_recording(self, name: str, label: str, extra: Mapping[str, Any]) -> None:
         """Keep that a value is another one in each recording, which nobody knows."""
         if extra["error"] != _OWN:
-            self.problem(
-                f"{label}.error = {_shown(extra['error'])} is not allowed: {_OWN!r}, another value "
-                "in each recording; the known value of one recording is given in case.toml"
+            self.refuse(
+                f"{label}.error",
+                extra["error"],
+                f"{_OWN!r}, another value "
+                "in each recording; the known value of one recording is given in case.toml",
             )
         for word in ("tol", "unknown", "std"):
             if word in extra:
@@ -498,17 +495,13 @@ class Reader:
                 continue
             given = entry.get("parameters", {})
             if not isinstance(given, Mapping):
-                self.problem(
-                    f"{label}.parameters = {_shown(given)} is not allowed: a table is needed"
-                )
+                self.refuse(f"{label}.parameters", given, "a table is needed")
                 continue
             name = entry.get("form", "")
             form = next((form for form in info.forms if name in ("", form.name)), None)
             if form is None:
                 names = ", ".join(repr(form.name) for form in info.forms)
-                self.problem(
-                    f"{label}.form = {_shown(name)} is not allowed: {identity} has {names}"
-                )
+                self.refuse(f"{label}.form", name, f"{identity} has {names}")
                 continue
             self.unknown_keys(
                 f"{identity}.", given, [parameter.name for parameter in form.parameters]
@@ -528,9 +521,7 @@ class Reader:
     def place(self, label: str, block: str, raw: Any) -> str:
         """Name of the block that an effect acts on, ``""`` for every one of its kind."""
         if not isinstance(raw, str):
-            self.problem(
-                f"{label}.at = {_shown(raw)} is not allowed: the name of a {block} is needed"
-            )
+            self.refuse(f"{label}.at", raw, f"the name of a {block} is needed")
             return ""
         return bare(block, raw)
 
@@ -540,10 +531,7 @@ class Reader:
         if raw is None:
             return float(parameter.default)
         if not isinstance(raw, Mapping):
-            self.problem(
-                f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = "
-                f"{parameter.unit!r} }}"
-            )
+            self.no_unit(label, raw, parameter.unit)
             return None
         if "tol" in raw:
             self.problem(

@@ -21,11 +21,20 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs._checks import checked_number, checked_table, one_of
 from pamrs._files import read_toml
 from pamrs._views import Panels, View
+from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError, RigError, joined, meant
 from pamrs.rig._cautions import cautions_of
 from pamrs.rig._ports import Ports, connect, wiring
 from pamrs.rig._reader import Content, read_model
-from pamrs.rig._switching import Entry, full_name, named_entries, new_entry, placed, without
+from pamrs.rig._switching import (
+    Entry,
+    full_name,
+    kind_of_entry,
+    named_entries,
+    new_entry,
+    placed,
+    without,
+)
 from pamrs.rig._writer import core_json, toml_text
 from pamrs.rig.schema import BLOCKS, Key, keys_of, qualified, split_name, tables_of
 
@@ -440,7 +449,7 @@ class Rig(View):
             origin, numbers = self._grown_by(entry)
             object.__setattr__(found, "_origin", (origin, {**numbers, **own}))
             return found
-        same = [_kind(old) for old in before] == [_kind(new) for new in entries]
+        same = [kind_of_entry(old) for old in before] == [kind_of_entry(new) for new in entries]
         return found._with_origin(self, own) if same else found
 
     def with_case(self, folder: str) -> Rig:
@@ -464,7 +473,7 @@ class Rig(View):
         """The rig that this one differs from by numbers with an effect more, and these numbers."""
         origin, before = self.__dict__.get("_origin", (self, {}))
         grown: dict[tuple[str, str, str], Rig] = origin.__dict__.get("_grown", {})
-        kind = _kind(entry)
+        kind = kind_of_entry(entry)
         if kind not in grown:
             same = {**origin._model, "effects": [*origin._model["effects"], entry]}
             grown[kind] = Rig(
@@ -604,17 +613,10 @@ class Rig(View):
         RigError
             If the file cannot be written.
         """
-        from pamrs._writing import write_atomically
-
         try:
             return write_atomically(path, self.to_toml_text())
         except OSError as error:
             raise RigError(f"{path}: cannot be written ({error.strerror or error})") from error
-
-
-def _kind(entry: Entry) -> tuple[str, str, str]:
-    """What an effect is beside its numbers."""
-    return entry["id"], entry.get("at", ""), entry.get("form", "")
 
 
 def _with_its_keys(dotted: str, table: dict[str, Any]) -> set[str]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from pamrs._checks import checked_number, checked_table
+from pamrs._checks import checked_number, checked_table, one_of, refused
 from pamrs.errors import ParameterError, joined, meant
 from pamrs.rig._ports import bare, effect_problem, hanging_problem, near_name
 from pamrs.rig.schema import qualified
@@ -32,10 +32,7 @@ def new_entry(
         )
     info = EFFECTS[effect]
     forms = [known.name for known in info.forms]
-    if form not in ("", *forms):
-        raise ParameterError(
-            f"form = {form!r} is not allowed: {effect} has {', '.join(map(repr, forms))}"
-        )
+    one_of("form", form, ("", *forms), also=f" for {effect}")
     place = block_name(info.at, at)
     given = {} if parameters is None else checked_table("parameters", parameters)
     spread = {} if std is None else checked_table("std", std)
@@ -74,6 +71,11 @@ def _checked(
     return chosen, problems
 
 
+def kind_of_entry(entry: Mapping[str, Any]) -> tuple[str, str, str]:
+    """What an effect is beside its numbers."""
+    return entry["id"], entry.get("at", ""), entry.get("form", "")
+
+
 def placed(entries: Iterable[Entry], entry: Entry) -> list[Entry]:
     """The effects of a rig with one more, in the place of the first of those that it replaces."""
     place, found, first = entry.get("at", ""), [], None
@@ -102,17 +104,15 @@ def without(entries: list[Entry], effect: Any, at: Any) -> list[Entry]:
     of_id = [entry.get("at", "") for entry in entries if entry["id"] == effect]
     if place not in of_id:
         there = ", ".join(f"at {name!r}" if name else "everywhere" for name in of_id)
-        raise ParameterError(
-            f"at = {at!r} is not allowed: {effect} acts "
-            f"{there or 'nowhere in this rig, which is without it'}"
-        )
+        there = there or "nowhere in this rig, which is without it"
+        raise refused("at", at, f"{effect} acts {there}")
     return [entry for entry in entries if entry["id"] != effect or entry.get("at", "") != place]
 
 
 def block_name(block: str, at: Any) -> str:
     """Name of the block at which an effect acts, without its kind."""
     if not isinstance(at, str):
-        raise ParameterError(f"at = {at!r} is not allowed: the name of a block is needed")
+        raise refused("at", at, "the name of a block is needed")
     return bare(block, at)
 
 

@@ -259,11 +259,9 @@ def _nonzero(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]
 
 def _transmission(table: Mapping[str, Any] | None) -> dict[str, Any] | None:
     """How a muscle pulls on its joint; None where it is the joint's own way."""
-    return (
-        None
-        if table is None
-        else {key: value for key, value in table.items() if key not in (*STOPS, *SPRING)}
-    )
+    if table is None:
+        return None
+    return {key: value for key, value in table.items() if key not in (*STOPS, *SPRING)}
 
 
 def _arm(model: Mapping[str, Any], ports: Ports) -> dict[str, Any] | None:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from importlib import resources
 from typing import TYPE_CHECKING, Final
 
+from pamrs._checks import one_of
 from pamrs.errors import ParameterError, meant
 
 if TYPE_CHECKING:
@@ -120,10 +121,7 @@ def template(like: str = "shoulder", name: str | None = None, gas: str = "energy
     """
     from pamrs.rigs._keys import every_key
 
-    if gas not in ("energy_balance", "coefficients"):
-        raise ParameterError(
-            f"gas = {gas!r} is not allowed: 'energy_balance' or 'coefficients' is needed"
-        )
+    one_of("gas", gas, ("energy_balance", "coefficients"))
     text = _with_energy_balance(_text(like)) if gas == "energy_balance" else _text(like)
     if name is not None:
         if not name.strip():

@@ -7,8 +7,6 @@ from itertools import groupby
 
 from pamrs.rig.schema import BLOCKS, PORTS, SINGLE_BLOCKS, Key, Port
 
-__all__ = ["every_key"]
-
 _INTRODUCTION = """\
 Every key that a rig file may have. Each number is { value, unit }, any unit \
 of the right dimension; with tol (one standard
@@ -71,11 +69,9 @@ def _line(key: Key, *, inner: bool) -> str:
 def _numbers(key: Key) -> str:
     what = {"vector": "list", "count": "whole number"}.get(key.kind, "number")
     unit = "" if key.unit == "1" else f" [{key.unit}]"
-    bounds = (
-        f" from {key.lower:.4g} to {key.upper:.4g}"
-        if math.isfinite(key.lower) and math.isfinite(key.upper)
-        else ""
-    )
+    bounds = ""
+    if math.isfinite(key.lower) and math.isfinite(key.upper):
+        bounds = f" from {key.lower:.4g} to {key.upper:.4g}"
     return f"{what}{unit}{bounds}"
 
 

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import as_numbers, as_said, quantities, whole
+from pamrs._checks import as_numbers, as_said, check_names, quantities, refused, whole
 from pamrs._tables import Columns, Tabular
 from pamrs._views import COLOURS, Panels, View, in_laboratory_units, over_time
 from pamrs.channels import unit_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation._driving import initial_values, inputs_of, keywords
+from pamrs.simulation._driving import by_signal, initial_values, inputs_of, keywords
 from pamrs.simulation._plants import plants_of, rowwise, thread_count
 from pamrs.simulation._simulation import (
     MOST_NUMBERS,
@@ -209,9 +209,10 @@ class Batch:
         count = plants_of(n, len(given) if many else None, starts)
         channels = len(core_rig(given[0]).channels)
         if count * channels > MOST_NUMBERS:
-            raise ParameterError(
-                f"n = {count} is not allowed: at most {MOST_NUMBERS // channels} plants of "
-                f"{channels} channels (2 GB)"
+            raise refused(
+                "n",
+                count,
+                f"at most {MOST_NUMBERS // channels} plants of {channels} channels (2 GB)",
             )
         self.rigs: tuple[Rig, ...] = tuple(given) if many else (given[0],) * count
         """The rig of each plant."""
@@ -319,9 +320,7 @@ class Batch:
                 "(time, message)"
             ) from None
         if not 0 <= samples < 2**53:
-            raise ParameterError(
-                f"state.samples = {samples} is not allowed: a number from 0 on is needed"
-            )
+            raise refused("state.samples", samples, "a number from 0 on is needed")
         self._core.restore(samples, rows, status)
 
     @quantities
@@ -384,12 +383,7 @@ class Batch:
             If a command is missing, not finite (the index is the plant's) or of another length; the
             batch stays as it is.
         """
-        asked = {
-            "valve_command": valve_command,
-            "supply_command": supply_command,
-            "length": length,
-            "pressure": pressure,
-        }
+        asked = by_signal(valve_command, supply_command, length, pressure)
         return self._named(self._core.advance(1, self._inputs.rows(len(self), asked), True))
 
     @quantities
@@ -468,12 +462,7 @@ class Batch:
                 known if channels is None else [channels] if isinstance(channels, str) else channels
             )
         )
-        for name in names:
-            if name not in known:
-                raise ParameterError(
-                    f"channels has {name!r}, which these plants do not have; there are: "
-                    f"{', '.join(known)}"
-                )
+        check_names("channels", names, known)
         rows = total // every + 1
         if rows * len(self) * len(names) > MOST_NUMBERS:
             most = MOST_NUMBERS // (len(self) * len(names))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import by_hand, doubt_pascals, one_of
+from pamrs._checks import by_hand, doubt_pascals, one_of, refused
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.errors import ParameterError, meant
 from pamrs.simulation._plants import rowwise
@@ -42,6 +42,11 @@ _INITIAL = {
 _BETWEEN = {"segment_pressure": 1, "segment_flow": 0}
 _LEAST_PRESSURE = 1.0  # Pa, absolute
 _MOST_PRESSURE = 1e8  # Pa, gauge
+
+
+def by_signal(*given: Any) -> dict[str, Any]:
+    """A user's arguments by :data:`SIGNALS`, in their order."""
+    return dict(zip(SIGNALS, given, strict=True))
 
 
 def signals_of(
@@ -323,9 +328,7 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
         try:
             start[name] = float(value)
         except (TypeError, ValueError):
-            raise ParameterError(
-                f"initial {name} = {value!r} is not allowed: a number is needed"
-            ) from None
+            raise refused(f"initial {name}", value, "a number is needed") from None
         if unit_of(channel) == "Pa" and by_hand(start[name]):
             doubt_pascals(f"initial {name}", start[name], inside=3)
     return start

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import as_numbers, as_said, whole
+from pamrs._checks import as_numbers, as_said, refused, whole
 from pamrs.errors import ParameterError
 
 Array = NDArray[np.float64]
@@ -52,9 +52,7 @@ def rowwise(name: str, values: ArrayLike, n: int, *, finite: bool = True) -> Arr
             f"{name} has the shape {array.shape}; ({n},) is needed, one value for each plant"
         )
     for row in np.flatnonzero(~np.isfinite(array))[:1] if finite else ():
-        raise ParameterError(
-            f"{name}[{row}] = {array[row]} is not allowed: a finite number is needed"
-        )
+        raise refused(f"{name}[{row}]", array[row], "a finite number is needed")
     return np.ascontiguousarray(array)
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import as_numbers, check_column, one_of, plain, quantities, whole
+from pamrs._checks import as_numbers, check_column, one_of, plain, quantities, refused, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._batch import BatchRun, Failure
-from pamrs.simulation._driving import initial_values, inputs_of, prescribed
+from pamrs.simulation._driving import by_signal, initial_values, inputs_of, prescribed
 from pamrs.simulation._plants import plants_of, rowwise, thread_count
 from pamrs.simulation._simulation import (
     MOST_NUMBERS,
@@ -120,12 +120,7 @@ def simulate_batch(
     ((500,), True)
     """
     check_run(rig, sample_time)
-    asked = {
-        "valve_command": valve_command,
-        "supply_command": supply_command,
-        "length": length,
-        "pressure": pressure,
-    }
+    asked = by_signal(valve_command, supply_command, length, pressure)
     given = inputs_of(rig).named(asked)
     signals = {name: _numbers(name, values) for name, values in given.items()}
     rows = _row_count(signals, duration, sample_time)
@@ -230,9 +225,10 @@ def _check_size(
 def _reduction(name: str, asked: Reduction, rows: int) -> tuple[str, str, list[float]]:
     """A reduction as the core takes it: channel, kind and reference."""
     if isinstance(asked, str) or not isinstance(asked, Sequence) or len(asked) not in (2, 3):
-        raise ParameterError(
-            f"reduce[{name!r}] = {asked!r} is not allowed: (reduction, channel) or "
-            '("squared_error", channel, reference) is needed'
+        raise refused(
+            f"reduce[{name!r}]",
+            asked,
+            '(reduction, channel) or ("squared_error", channel, reference) is needed',
         )
     kind, channel, *more = asked
     one_of(f"reduce[{name!r}]", kind, REDUCTIONS)

@@ -16,15 +16,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import doubt_pascals, positive, quantities
+from pamrs._checks import check_kind, doubt_pascals, positive, quantities, refused
 from pamrs._tables import Columns, Tabular
 from pamrs._tables import over_time as columns_over_time
 from pamrs._views import Panels, View, in_laboratory_units, over_time
+from pamrs._writing import write_atomically
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
 from pamrs.rig import Rig
 from pamrs.simulation._driving import (
     Signals,
+    by_signal,
     initial_values,
     prescribed,
     sensor_zero,
@@ -151,11 +153,10 @@ class Balance:
         share = (
             f" ({100.0 * self.muscle_work / self.exergy:.1f} % of it)" if self.exergy > 0.0 else ""
         )
-        walls = (
-            ""
-            if self.heat is None or self.gas_work is None
-            else f"\nheat from the walls {self.heat:.4g} J, work of the gas {self.gas_work:.4g} J"
-        )
+        walls = ""
+        if self.heat is not None and self.gas_work is not None:
+            walls = f"\nheat from the walls {self.heat:.4g} J"
+            walls += f", work of the gas {self.gas_work:.4g} J"
         return (
             f"{air}{walls}\nair's energy R T m {self.energy:.4g} J, exergy {self.exergy:.4g} J; "
             f"net work of the muscles {self.muscle_work:.4g} J"
@@ -486,8 +487,6 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         Path
             The file written.
         """
-        from pamrs._writing import write_atomically
-
         return write_atomically(path, _motion().channels_png(self, recorded, nominal))
 
     def animate(self, path: str | os.PathLike[str], *, speed: float = 1.0) -> Path:
@@ -633,12 +632,7 @@ def simulate(
     wanted = None if record is None else names_of("record", record)
     core = core_rig(rig)
     kept = 1 + len(core.inputs) + len(core.channels if wanted is None else wanted)
-    asked = {
-        "valve_command": valve_command,
-        "supply_command": supply_command,
-        "length": length,
-        "pressure": pressure,
-    }
+    asked = by_signal(valve_command, supply_command, length, pressure)
     long = [name for name, signal in asked.items() if _is_long(signal)]
     rows = None if duration is None else rows_of(duration, sample_time, long)
     check_rows(kept, rows or 0)
@@ -669,19 +663,13 @@ def simulate(
 def names_of(argument: str, names: Iterable[str]) -> list[str]:
     """Names as a list; an error names the argument where it is a single string."""
     if isinstance(names, str):
-        raise ParameterError(
-            f"{argument} = {names!r} is not allowed: a sequence of names is needed"
-        )
+        raise refused(argument, names, "a sequence of names is needed")
     return [str(name) for name in names]
 
 
 def check_run(rig: Rig, sample_time: float) -> None:
     """Refuse what is not a rig and a sample time [s] that is not a finite number above zero."""
-    if not isinstance(rig, Rig):
-        raise ParameterError(
-            f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), "
-            "pamrs.load_rig(path)"
-        )
+    check_kind("rig", rig, Rig, "a Rig (pamrs.rigs.shoulder(), pamrs.load_rig(path))")
     positive("sample_time", sample_time)
 
 
@@ -751,7 +739,7 @@ def chosen_step(sample_time: float, step: float | None) -> float:
     and is at most 1 ms.
     """
     if step is not None and not isinstance(step, (int, float, np.number)):
-        raise ParameterError(f"step = {step!r} is not allowed: a time > 0 s is needed")
+        raise refused("step", step, "a time > 0 s is needed")
     return default_step(sample_time) if step is None else float(step)
 
 

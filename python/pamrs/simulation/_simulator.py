@@ -12,7 +12,14 @@ from pamrs import _core
 from pamrs._checks import as_numbers, quantities
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation._driving import Signals, initial_values, inputs_of, keywords, signals_of
+from pamrs.simulation._driving import (
+    Signals,
+    by_signal,
+    initial_values,
+    inputs_of,
+    keywords,
+    signals_of,
+)
 from pamrs.simulation._simulation import (
     MOST_STATE,
     Event,
@@ -177,12 +184,7 @@ class Simulator:
         if supply_command is length is pressure is None:
             done = self._core.step(valve_command)
         if done is None:
-            asked = {
-                "valve_command": valve_command,
-                "supply_command": supply_command,
-                "length": length,
-                "pressure": pressure,
-            }
+            asked = by_signal(valve_command, supply_command, length, pressure)
             done = self._held(asked)
         sample, events = done
         if events:
@@ -228,12 +230,7 @@ class Simulator:
             As :meth:`step`.
         """
         self._check_rows(samples or 0)
-        asked = {
-            "valve_command": valve_command,
-            "supply_command": supply_command,
-            "length": length,
-            "pressure": pressure,
-        }
+        asked = by_signal(valve_command, supply_command, length, pressure)
         signals, count = signals_of(self.rig, asked, samples)
         if count is None:
             raise ParameterError("samples is missing: no signal says how many there are")

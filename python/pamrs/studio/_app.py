@@ -35,8 +35,6 @@ from pamrs.studio._folder import Studio
 from pamrs.studio._page import page
 from pamrs.studio._run import FILES
 
-__all__ = ["make_app"]
-
 _OWN: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "frame-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; "

@@ -9,8 +9,6 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.ready import readied
 from pamrs.recordings import Case
 
-__all__ = ["Check", "checked"]
-
 
 @dataclass(frozen=True)
 class Check:

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from pamrs._views import decimate
 
-__all__ = ["sparkline"]
-
 _WIDTH: Final = 240
 _HEIGHT: Final = 36
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 import tomlkit
 
 from pamrs import rigs
+from pamrs._checks import refused
 from pamrs._files import MOST_NAME, found_outside, is_inside, parse_toml, read_toml, resolved, shown
 from pamrs._writing import write_atomically
 from pamrs.diagnosis import Diagnosis
@@ -30,8 +31,6 @@ from pamrs.simulation import core_rig
 from pamrs.studio._check import Check, checked
 from pamrs.studio._run import RESULT, Run
 from pamrs.units import to_si
-
-__all__ = ["ROLES", "Studio", "Table"]
 
 ROLES: Final = {
     "fit": "fitted",
@@ -162,7 +161,7 @@ class Studio:
         """
         own = shown(Path(name.replace("\\", "/")).name).lstrip(".")[-MOST_NAME:]
         if not own or own.endswith((".toml", ".part")):
-            raise ParameterError(f"file = {name!r} is not allowed: the name of a log is needed")
+            raise refused("file", name, "the name of a log is needed")
         target = self.folder / own
         if os.path.lexists(target):
             raise ParameterError(f"{own}: is there already; give the new log another name")
@@ -426,7 +425,7 @@ def _entries(table: Table, given: Mapping[str, Any]) -> Iterator[dict[str, Any]]
     """The entries of case.toml for a log, as the user wants them."""
     role, file = given.get("role"), table.key[0]
     if role not in table.roles:
-        raise ParameterError(f"{file}: role = {role!r} is not allowed: {', '.join(table.roles)}")
+        raise refused(f"{file}: role", role, ", ".join(table.roles))
     if role == "":
         return
     channels = _chosen(table, given.get("columns", {}))
@@ -439,9 +438,7 @@ def _entries(table: Table, given: Mapping[str, Any]) -> Iterator[dict[str, Any]]
         try:
             made["sample_time"] = to_si(float(number), unit.strip(), "time")
         except ValueError as error:
-            raise ParameterError(
-                f'{file}: spacing = {spacing!r} is not allowed: write it like "1 ms"'
-            ) from error
+            raise refused(f"{file}: spacing", spacing, 'write it like "1 ms"') from error
     pieces = table.item.pieces
     if role == "parts":
         for own, some in (("fit", pieces[:-1]), ("held_out", pieces[-1:])):

@@ -15,8 +15,6 @@ from pamrs.report.page import render_page
 from pamrs.studio._curves import sparkline
 from pamrs.studio._folder import Studio, Table
 
-__all__ = ["page"]
-
 _TEMPLATE: Final = Path(__file__).with_name("page.html.j2")
 _UNITS: Final = "bar bar(a) mbar kPa kPa(a) MPa Pa psi deg rad mm m V mV mA N kN kg K degC 1 %"
 

@@ -12,9 +12,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final
 
+from pamrs._writing import write_atomically
+from pamrs.errors import PamrsError
 from pamrs.report.text import hypothesis_label
-
-__all__ = ["FILES", "RESULT", "Run"]
 
 RESULT: Final = "result"
 """Folder of the results, in the case folder."""
@@ -29,7 +29,6 @@ _PATIENCE: Final = 5.0  # s that an ended process gets to be gone
 def _work(folder: Path, pipe: Connection) -> None:
     """Diagnose a case, write its results, and send lines, at last an error's text or nothing."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the page, which ends this
-    from pamrs.errors import PamrsError
 
     def send(item: object) -> None:
         try:
@@ -51,7 +50,6 @@ def _work(folder: Path, pipe: Connection) -> None:
 
 
 def _diagnose(folder: Path, tell: Any) -> None:
-    from pamrs._writing import write_atomically
     from pamrs.diagnosis import diagnose
     from pamrs.rig import Rig
 

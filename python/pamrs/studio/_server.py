@@ -12,8 +12,6 @@ from pamrs.errors import ParameterError
 from pamrs.studio._app import make_app
 from pamrs.studio._folder import Studio
 
-__all__ = ["serve"]
-
 
 def serve(studio: Studio, port: int = 0, *, ready: Callable[[str], object] = print) -> None:
     """Serve the page until Ctrl-C; a diagnosis that goes on then is ended.

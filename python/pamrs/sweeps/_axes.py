@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import check_column, without_units
+from pamrs._checks import as_column, check_column
 from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, meant
@@ -192,19 +192,6 @@ class Axes(ABC):
         return math.prod(self.shape)
 
 
-def _column(name: str, values: ArrayLike) -> Array:
-    without_units(name, values)
-    try:
-        column = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"the values of {name} are not allowed: numbers are needed") from None
-    if column.ndim != 1 or column.size == 0:
-        raise ParameterError(
-            f"the values of {name} have the shape {column.shape}; (n,) with n >= 1 is needed"
-        )
-    return column
-
-
 def _columns(given: Any, what: str) -> dict[str, Array]:
     if not isinstance(given, Mapping) or not given:
         found = "is empty" if isinstance(given, Mapping) else f"is a {type(given).__name__}"
@@ -212,7 +199,7 @@ def _columns(given: Any, what: str) -> dict[str, Array]:
             f"{what} {found}; a mapping of names to values is needed, "
             "{'arm.payload': [5.0, 9.0]}, or pamrs.sweeps.Samples"
         )
-    return {str(name): _column(str(name), values) for name, values in given.items()}
+    return {str(name): as_column(str(name), values) for name, values in given.items()}
 
 
 class _Listed(Axes):

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import one_of, whole
+from pamrs._checks import one_of, refused, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.sweeps._axes import Axes, Quantity, chosen, quantity
@@ -75,9 +75,8 @@ def ranges(
     """The distribution of each parameter; arguments and errors as of :func:`samples`."""
     bounds = within if isinstance(within, Mapping) else {}
     if not isinstance(within, Mapping) and within != "tolerance":
-        raise ParameterError(
-            f"within = {within!r} is not allowed: 'tolerance', or a mapping such as "
-            "{'arm.payload': (5.0, 9.0)}"
+        raise refused(
+            "within", within, "'tolerance', or a mapping such as {'arm.payload': (5.0, 9.0)}"
         )
     if parameters is None and not bounds:
         known = [name for name, p in rig.parameters.items() if 0.0 < p.tol < np.inf]
@@ -106,9 +105,7 @@ def _between(known: Quantity, bounds: Any) -> Range:
     try:
         low, high = (float(end) for end in bounds)
     except (TypeError, ValueError):
-        raise ParameterError(
-            f"within[{known.name!r}] = {bounds!r} is not allowed: (lowest, highest) is needed"
-        ) from None
+        raise refused(f"within[{known.name!r}]", bounds, "(lowest, highest) is needed") from None
     if not (known.lower <= low < high <= known.upper and np.isfinite(high - low)):
         raise ParameterError(
             f"within[{known.name!r}] = ({low:g}, {high:g}) is not allowed: the lower end first, "

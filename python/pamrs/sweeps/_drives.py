@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import one_of, refused
 from pamrs.channels import dotted, unit_of
 from pamrs.errors import PamrsError, ParameterError, RigError
 from pamrs.rig import Rig, parse_rig
@@ -91,14 +92,12 @@ def metric_of(name: str, given: Any) -> Metric:
     parts = tuple(given) if isinstance(given, (tuple, list)) else ()
     most = 3 if parts and parts[0] == "squared_error" else 2
     if not (2 <= len(parts) <= most and all(isinstance(word, str) for word in parts[:2])):
-        raise ParameterError(
-            f"metrics[{name!r}] = {given!r} is not allowed: ('final', 'joint_angle') or "
-            "('squared_error', 'joint_angle', reference) is needed"
+        raise refused(
+            f"metrics[{name!r}]",
+            given,
+            "('final', 'joint_angle') or ('squared_error', 'joint_angle', reference) is needed",
         )
-    if parts[0] not in REDUCTIONS:
-        raise ParameterError(
-            f"metrics[{name!r}] has the reduction {parts[0]!r}; one of: {', '.join(REDUCTIONS)}"
-        )
+    one_of(f"metrics[{name!r}]", parts[0], REDUCTIONS)
     if len(parts) == 2:
         return Metric(parts[0], parts[1])
     try:

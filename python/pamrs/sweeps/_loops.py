@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import control
+from pamrs._checks import check_kind, refused
 from pamrs.control.trajectories import Trajectory
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
@@ -113,9 +114,11 @@ def _name_of(controller: Any) -> str:
         return f"{_name_of(controller.func)}({', '.join(fixed)})"
     name = f"{getattr(controller, '__module__', '')}.{getattr(controller, '__qualname__', '')}"
     if not callable(controller) or "<" in name or name.startswith(".") or name.endswith("."):
-        raise ParameterError(
-            f"controller = {controller!r} is not allowed: a class, or a function of a module, that "
-            "is called with gains by name and can be pickled (functools.partial fixes the others)"
+        raise refused(
+            "controller",
+            controller,
+            "a class, or a function of a module, that is called with gains by name and can be "
+            "pickled (functools.partial fixes the others)",
         )
     return name
 
@@ -167,11 +170,7 @@ def gain_map(
         As :func:`sweep`, and if the controller is not one that every process can find by its name.
     """
     _name_of(controller)
-    if not isinstance(trajectory, Trajectory):
-        raise ParameterError(
-            f"trajectory is a {type(trajectory).__name__}; one of pamrs.control.trajectories is "
-            "needed"
-        )
+    check_kind("trajectory", trajectory, Trajectory, "one of pamrs.control.trajectories")
     given = {"duration": duration, "sample_time": sample_time, "step": step}
     loop: dict[str, Any] = {k: float(v) for k, v in given.items() if v is not None}
     loop |= {"initial": {k: float(v) for k, v in initial.items()}} if initial else {}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import one_of, whole
+from pamrs._checks import one_of, refused, whole
 from pamrs.errors import ParameterError, missing_package
 from pamrs.rig import Rig
 from pamrs.sweeps._axes import Samples
@@ -98,7 +98,7 @@ def sensitivity(
     whole("n", n, 2)
     whole("seed", seed)
     if method == "sobol" and n & (n - 1):
-        raise ParameterError(f"n = {n} is not allowed: a power of two is needed for 'sobol'")
+        raise refused("n", n, "a power of two is needed for 'sobol'")
     known = ranges(rig, parameters, within)
     design = _design(method, len(known), n, seed)
     columns = {p.name: p.values(design.cube[:, k]) for k, p in enumerate(known)}

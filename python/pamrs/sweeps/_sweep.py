@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import quantities, whole
+from pamrs._checks import check_kind, quantities, refused, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.sweeps._axes import INITIAL, Axes, Grid
@@ -163,7 +163,7 @@ def _number(name: str, given: Any) -> float:
     try:
         return float(given)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} = {given!r} is not allowed: a number is needed") from None
+        raise refused(name, given, "a number is needed") from None
 
 
 def run_plan(
@@ -179,11 +179,7 @@ def run_plan(
     progress: bool | Callable[[str], object] = True,
 ) -> xr.Dataset:
     """Run what a drive says over axes; other arguments, result and errors as of :func:`sweep`."""
-    if not isinstance(rig, Rig):
-        raise ParameterError(
-            f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), "
-            "pamrs.load_rig(path)"
-        )
+    check_kind("rig", rig, Rig, "a Rig (pamrs.rigs.shoulder(), pamrs.load_rig(path))")
     axes = over if isinstance(over, Axes) else Grid(over)
     axes.check(lambda name: drive.quantity(rig, name))
     _check_names(axes, drive)

@@ -14,8 +14,6 @@ from pamrs.recordings._gate import Gate
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
 from pamrs.recordings.logs._tables import series_of_matrix
 
-__all__ = ["leads_elsewhere", "members", "read_hdf"]
-
 _UNITS: Final = ("unit", "units", "Unit", "Units", "UNIT")
 _RATES: Final = ("sample_rate", "sampling_rate", "fs", "rate", "SampleRate")  # [Hz]
 _STEPS: Final = ("sample_time", "dt", "wf_increment", "increment")  # [s]

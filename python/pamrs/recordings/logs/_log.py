@@ -19,8 +19,6 @@ from pamrs.recordings._stamps import TIME_UNITS
 from pamrs.recordings.table import Table
 from pamrs.units import parse_unit
 
-__all__ = ["Log", "Series", "TextFormat", "collected", "numbers_of", "table_of"]
-
 Array = NDArray[np.float64]
 
 

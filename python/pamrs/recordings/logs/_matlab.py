@@ -15,8 +15,7 @@ from pamrs.recordings.logs._hdf import leads_elsewhere, members
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected, numbers_of
 from pamrs.recordings.logs._tables import series_of_matrix
 from pamrs.recordings.logs._words import understood_unit
-
-__all__ = ["read_matlab"]
+from pamrs.units import parse_unit, same_dimension
 
 _DEEPEST = 12  # structs in structs
 
@@ -277,7 +276,6 @@ def _times(time: Any, about: Mapping[str, Any]) -> Array | None:
 
 
 def _seconds(time: Array, about: Mapping[str, Any]) -> Array:
-    from pamrs.units import parse_unit, same_dimension
 
     known = understood_unit(_text(about.get("units")) or "s")
     if known is None or not same_dimension(known.unit, "s"):

@@ -13,8 +13,6 @@ import numpy as np
 from pamrs.recordings._gate import Gate
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected, numbers_of
 
-__all__ = ["read_mdf", "read_tdms"]
-
 _SILENCE = threading.Lock()
 """Only one file at a time is opened without what Python says of failing destructors."""
 

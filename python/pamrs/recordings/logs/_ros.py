@@ -18,8 +18,6 @@ from pamrs.errors import RecordingError
 from pamrs.recordings._gate import Unpacking, check_size
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
 
-__all__ = ["read_bag", "read_mcap"]
-
 _MOST_ELEMENTS: Final = 64  # of an array in a message; longer ones are images and the like
 _DEEPEST: Final = 8
 _SECONDS: Final = (("sec", "nanosec"), ("secs", "nsecs"), ("seconds", "nanos"))

@@ -8,8 +8,6 @@ from typing import Final
 
 from pamrs.recordings.table import told_rows
 
-__all__ = ["arrows_apart", "labelled_rows"]
-
 _ARROW: Final = re.compile(r"\s*(\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?)\s*->\s?(.*)")
 _NUMBER: Final = r"[-+]?(?:\d+(?:[.,]\d+)?|\.\d+)(?:[eE][-+]?\d+)?|nan|ovf|inf|OL|#N/A"
 _PAIR: Final = re.compile(

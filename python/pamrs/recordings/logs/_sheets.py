@@ -18,8 +18,6 @@ from pamrs.recordings.logs._log import Log, Series, TextFormat, collected
 from pamrs.recordings.logs._text import log_of_lines
 from pamrs.recordings.table import lines_of_rows
 
-__all__ = ["read_sheets"]
-
 _COMMA: Final = re.compile(r"[-+]?\d+,\d+")
 _CELL: Final = re.compile(rb'<(?:\w+:)?(?:c|row)\b[^>]*?\br="([A-Z]{0,7})(\d{1,9})"')
 _BLOCK: Final = 1 << 20

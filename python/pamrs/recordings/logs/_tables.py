@@ -12,8 +12,6 @@ from pamrs.recordings._gate import admit_arrow, admit_numpy
 from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, numbers_of
 from pamrs.recordings.logs._words import split_heading
 
-__all__ = ["read_arrow", "read_numpy", "series_of_matrix"]
-
 
 def read_arrow(path: Path, form: TextFormat) -> Log:
     """Read a Parquet or Feather file.

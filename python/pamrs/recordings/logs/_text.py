@@ -28,8 +28,6 @@ from pamrs.recordings.table import (
     usual_width,
 )
 
-__all__ = ["log_of_lines", "read_text_log"]
-
 _COMMENTS: Final = ("#", "%", "//", "'")
 _UNNAMED: Final = "column "
 _LINES: Final = 400  # in the middle of a table, which tell how it is written

@@ -8,8 +8,6 @@ from typing import Final, NamedTuple
 from pamrs.errors import ParameterError
 from pamrs.units import measured_from, parse_unit
 
-__all__ = ["Written", "split_heading", "understood_unit", "unwrapped"]
-
 _PAIRS: Final = {"[": "]", "(": ")", "{": "}", "<": ">"}
 _BRACKETS = re.compile(
     r"^\s*(?P<name>.*?)[\s_]*(?:\[(?P<square>[^\[\]]*)\]"
