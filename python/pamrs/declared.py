@@ -119,9 +119,21 @@ def told(
     origin : str
         Where the number comes from.
     """
-    given = dict(locals())  # every argument by its name
-    must = required and not optional and not omit_empty
-    return {**given, "enum": tuple(enum), "required": must}
+    return {
+        "about": about,
+        "key": key,
+        "json": json,
+        "optional": optional,
+        "omit_empty": omit_empty,
+        "kind": kind,
+        "enum": tuple(enum),
+        "required": required and not optional and not omit_empty,
+        "least_length": least_length,
+        "unit": unit,
+        "least": least,
+        "most": most,
+        "origin": origin,
+    }
 
 
 def reference(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:

@@ -100,9 +100,16 @@ def load_force_map(
         or the wrong one, or fewer than two rows are usable.
     """
     file = Path(path)
-    given: dict[str, Any] = dict(locals())  # what says how a table is read, by its name
-    for key in ("path", "allow_outside", "file"):
-        del given[key]
+    given: dict[str, Any] = {
+        "rest_length": rest_length,
+        "columns": columns,
+        "where": where,
+        "clipped": clipped,
+        "level_tolerance": level_tolerance,
+        "delimiter": delimiter,
+        "decimal": decimal,
+        "name": name,
+    }
     if file.suffix.lower() != ".toml":
         return read_map(file, **given)
     for key, value in given.items():

@@ -66,11 +66,20 @@ class Joint:
         radius: float = 0.0,
         coefficients: Sequence[float] = (),
     ) -> None:
-        given = dict(locals())  # every argument by its name, in their order
-        del given["self"], given["kind"], given["coefficients"]
-        self._spec: dict[str, Any] = {"kind": kind}
-        self._spec |= {name: finite(f"joint.{name}", value) for name, value in given.items()}
-        self._spec["coefficients"] = [finite("joint.coefficients", own) for own in coefficients]
+        self._spec: dict[str, Any] = {
+            "kind": kind,
+            "rest_angle": float(rest_angle),
+            "upper_axial": float(upper_axial),
+            "upper_offset": float(upper_offset),
+            "lower_axial": float(lower_axial),
+            "lower_offset": float(lower_offset),
+            "radius": float(radius),
+            "coefficients": [float(value) for value in coefficients],
+        }
+        for name, value in self._spec.items():
+            for number in value if isinstance(value, list) else [value]:
+                if name != "kind":
+                    finite(f"joint.{name}", number)
         self._core = _core.Joint(json.dumps(self._spec))
 
     @classmethod

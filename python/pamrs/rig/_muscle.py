@@ -15,7 +15,6 @@ from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
 
 Array = NDArray[np.float64]
-_LISTS = {*PARAMETERS["map"], "modulus_slope", "modulus_offset", "extension_factors"}
 _FRICTION = ("friction_coefficient", "friction_pressure_slope", "friction_floor")
 
 
@@ -103,13 +102,12 @@ class Muscle:
     def __init__(
         self,
         *,
-        model: str = "robinson",
-        geometry: str | None = None,
-        count: int = 1,
         rest_length: float,
         rest_diameter: float,
         braid_angle: float,
         wall_thickness: float,
+        model: str = "robinson",
+        geometry: str | None = None,
         modulus_slope: Sequence[float] = (),
         modulus_offset: Sequence[float] = (),
         c10: float = 0.0,
@@ -119,27 +117,51 @@ class Muscle:
         map_pressure: Sequence[float] = (),
         map_contraction: Sequence[float] = (),
         map_force: Sequence[float] = (),
-        modulus_scale: float = 1.0,
-        softening: float = 0.0,
-        temperature: float = 293.15,
-        reference_temperature: float = 293.15,
         friction_coefficient: float = 0.0,
         friction_pressure_slope: float = 0.0,
         friction_floor: float = 0.0,
         friction_presliding: float = 1e-3,
         buckling_load: float = 0.0,
+        count: int = 1,
+        modulus_scale: float = 1.0,
+        softening: float = 0.0,
+        temperature: float = 293.15,
+        reference_temperature: float = 293.15,
         k0: float = 1.64,
         contraction_slope: float = 2.405,
         extension_slope: float = 6.105,
         neck_floor: float = 0.80,
     ) -> None:
-        given: dict[str, Any] = dict(locals())  # every argument by its name, in their order
-        del given["self"]
-        if geometry is None:
-            given["geometry"] = own_geometry(model)
         self._model: dict[str, Any] = {
-            name: [float(v) for v in value] if name in _LISTS else value
-            for name, value in given.items()
+            "model": model,
+            "geometry": own_geometry(model) if geometry is None else geometry,
+            "count": count,
+            "rest_length": rest_length,
+            "rest_diameter": rest_diameter,
+            "braid_angle": braid_angle,
+            "wall_thickness": wall_thickness,
+            "modulus_slope": [float(v) for v in modulus_slope],
+            "modulus_offset": [float(v) for v in modulus_offset],
+            "c10": c10,
+            "c01": c01,
+            "bladder_modulus": bladder_modulus,
+            "extension_factors": [float(v) for v in extension_factors],
+            "map_pressure": [float(v) for v in map_pressure],
+            "map_contraction": [float(v) for v in map_contraction],
+            "map_force": [float(v) for v in map_force],
+            "modulus_scale": modulus_scale,
+            "softening": softening,
+            "temperature": temperature,
+            "reference_temperature": reference_temperature,
+            "friction_coefficient": friction_coefficient,
+            "friction_pressure_slope": friction_pressure_slope,
+            "friction_floor": friction_floor,
+            "friction_presliding": friction_presliding,
+            "buckling_load": buckling_load,
+            "k0": k0,
+            "contraction_slope": contraction_slope,
+            "extension_slope": extension_slope,
+            "neck_floor": neck_floor,
         }
         for name, value in self._model.items():
             for entry in value if isinstance(value, list) else [value]:
