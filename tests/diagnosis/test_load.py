@@ -33,7 +33,7 @@ DT = 0.005
 
 
 def recording(
-    rig: pamrs.Rig, name: str, role: str, seed: int, seconds: float = 7.0, pressure: float = 2.5e5
+    rig: pamrs.Rig, name: str, role: str, seed: int, seconds: float = 10.0, pressure: float = 2.5e5
 ) -> Recording:
     """Lifts and lowerings at two speeds, steps where it is held out; from a pressure [Pa], and from
     none at all by a lift.
