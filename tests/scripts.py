@@ -1,10 +1,14 @@
-"""Scripts that run in a Python process of their own."""
+"""Scripts in a Python process of their own, and commands in this one."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 import textwrap
+
+import pytest
+
+from pamrs import cli
 
 
 def script(code: str) -> list[str]:
@@ -14,3 +18,10 @@ def script(code: str) -> list[str]:
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.split()
+
+
+def command(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of a command of pamrs."""
+    code = cli.main([str(word) for word in words])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err

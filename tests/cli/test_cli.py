@@ -12,16 +12,10 @@ import pytest
 import pamrs
 from pamrs import cli
 from pamrs.findings import Protocol
+from tests.scripts import command as run
 from tests.tables import rows_of
 
 RIG = Path(pamrs.__file__).parent / "rigs" / "shoulder.toml"
-
-
-def run(capsys, *words):
-    """Exit code, standard output and standard error of one command."""
-    code = cli.main([str(word) for word in words])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def assert_one_clean_line(err, *parts):

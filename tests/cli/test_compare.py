@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from pamrs import cli
 from pamrs.findings import FreeRun, FreeRunError
 from tests.diagnosis import synthetic
+from tests.scripts import command
 
 
 def result(path: Path, **changes: Any) -> Path:
@@ -22,9 +22,7 @@ def result(path: Path, **changes: Any) -> Path:
 
 
 def told(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
-    code = cli.main(["compare", *map(str, words)])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
+    return command(capsys, "compare", *words)
 
 
 def test_two_results_are_set_side_by_side(tmp_path: Path, capsys: Any) -> None:

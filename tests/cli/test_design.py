@@ -8,9 +8,10 @@ import sys
 import numpy as np
 import pytest
 
-from pamrs import Joint, cli, library, rigs
+from pamrs import Joint, library, rigs
 from pamrs.cli import design as cli_design
 from pamrs.rig import parse_rig
+from tests.scripts import command
 from tests.tables import rows_of
 
 ARGUMENTS = {
@@ -33,9 +34,7 @@ def words(*more, **changes):
 
 
 def run(capsys, arguments):
-    code = cli.main(arguments)
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
+    return command(capsys, *arguments)
 
 
 def test_a_design_is_printed_and_repeats_by_its_seed(capsys):

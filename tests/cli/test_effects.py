@@ -6,19 +6,14 @@ import dataclasses
 
 import pytest
 
-from pamrs import cli, rigs
+from pamrs import rigs
 from pamrs.effects import CATALOGUE, EFFECTS, Form, text
 from pamrs.errors import ParameterError
 from pamrs.rig import parse_rig
 from tests.effects.test_effects import rig_for
+from tests.scripts import command as run
 
 IDS = [info.id for infos in text.catalogue().values() for info in infos]
-
-
-def run(capsys, *words):
-    code = cli.main(list(words))
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def test_every_effect_is_listed_with_block_and_name(capsys):

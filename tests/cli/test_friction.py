@@ -9,6 +9,7 @@ import pytest
 from pamrs import cli
 from pamrs.fit import fit_friction, load_force_map
 from pamrs.rig import Muscle
+from tests.scripts import command
 from tests.tables import rows_of
 
 C0, C1 = 0.16, -0.145e-6  # (2.36)
@@ -70,9 +71,7 @@ def table(tmp_path_factory):
 
 
 def run(capsys, *words):
-    code = cli.main(["fit", "friction", *(str(word) for word in words)])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
+    return command(capsys, "fit", "friction", *words)
 
 
 def printed(out, name):

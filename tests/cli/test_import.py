@@ -10,16 +10,14 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs import cli
 from pamrs.recordings import load_case
 from pamrs.recordings import logs as logs_package
 from tests.recordings.written import written
+from tests.scripts import command
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: Any) -> tuple[int, str, str]:
-    code = cli.main(["import", *map(str, arguments)])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
+    return command(capsys, "import", *arguments)
 
 
 def test_a_log_becomes_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,19 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pamrs import cli, library, load_rig
+from pamrs import library, load_rig
 from pamrs.design.sizing import Filling, Requirement, size
 from pamrs.library.published import compare
+from tests.scripts import command as run
 from tests.tables import rows_of
 
 POINTS = ["--point", "0 mm:18 kN", "--point", "30 mm:7 kN"]
 PAIR = ["elbow_0625in", "large_2in_effective"]
-
-
-def run(capsys, *words):
-    code = cli.main([str(word) for word in words])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def assert_refused(capsys, words, parts):

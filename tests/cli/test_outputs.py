@@ -14,6 +14,7 @@ import pamrs.recordings
 from pamrs import _writing, cli
 from pamrs._writing import check_writable, write_atomically
 from pamrs.errors import ParameterError
+from tests.scripts import command as run
 
 
 class Done:
@@ -55,12 +56,6 @@ def diagnosed(monkeypatch, tmp_path):
         pamrs.diagnosis, "diagnose", lambda case, **options: asked.append(case) or Done()
     )
     return asked
-
-
-def run(capsys, *words):
-    code = cli.main([str(word) for word in words])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 
 import pamrs
 from pamrs import cli
+from tests.scripts import command as run
 
 DT = 0.01
 
@@ -36,12 +37,6 @@ def case(tmp_path: Path) -> Path:
     (folder / "case.toml").write_text(f'schema = "pamrs.case/1"\n{entries}')
     true.with_case("case").to_toml(tmp_path / "model.toml")
     return folder
-
-
-def run(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
-    code = cli.main([str(word) for word in words])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def test_errors_of_the_nominal_rig_stand_beside_those_of_the_model(

@@ -38,41 +38,16 @@ def rig():
     return pamrs.rigs.shoulder()
 
 
-def moves_alike(rig, model, start, moved, *, low=2e-3):
-    """The core and its linear model, both from the operating point under commands; channels as the
-    sensors read them.
-    """
-    time = np.arange(301) * 1e-3
-    null = dict.fromkeys(model.inputs, 5.0)
-    commands = {name: null[name] + moved(time, k) for k, name in enumerate(model.inputs)}
-    named = {name.partition(".")[2]: values for name, values in commands.items()}
-    runs = [
-        pamrs.simulate(rig, values, sample_time=1e-3, initial=start)
-        for values in (named, {name: np.full(time.size, 5.0) for name in named})
-    ]
-    phi, gamma = model.sampled(1e-3)
-    x = np.zeros((time.size, len(model.states)))
-    u = np.array([commands[name] - null[name] for name in model.inputs])
-    for k in range(time.size - 1):
-        x[k + 1] = phi @ x[k] + gamma @ u[:, k]
-    y = x @ model.c.T
-    for k, name in enumerate(model.outputs):
-        went = runs[0][name] - runs[1][name]
-        assert np.abs(y[:, k]).max() > 0.0
-        assert went == pytest.approx(y[:, k], abs=low * np.abs(y[:, k]).max()), name
-
-
 @pytest.mark.parametrize("effect", MOVING)
-def test_states_of_effects_are_in_the_model_and_it_moves_as_the_core_does(rig, effect):
+def test_states_of_effects_are_in_the_model(rig, effect):
+    """That the model moves as the core does with each of them is said by test_linear.py."""
     given, states = MOVING[effect]
     altered = rig.with_effect(effect, given)
     model = linearise(altered, ANGLE, side="fill")
     assert list(model.states[3:]) == states
     bare = linearise(rig, ANGLE, side="fill")
     assert model.outputs == bare.outputs
-    still = altered if effect != "heat_transfer" else rig.with_effect(effect)
-    moves_alike(still, model, equilibrium(still, ANGLE), lambda t, _: 2e-3 * np.sin(30.0 * t) ** 2)
-    # and the effect is in it: without, the answer is another one
+    # the effect is in it: without, the answer is another one
     period = 0.3
     out, other = (m.c @ m.sampled(period)[1][:, 0] for m in (model, bare))
     assert np.abs(out / other - 1.0).max() > 1e-3
@@ -174,8 +149,6 @@ def test_of_several_joints_each_has_to_rest(two_joints):
     model = linearise(rig, 0.8, joint="elbow", chamber="elbow", initial=start, side="fill")
     assert np.linalg.eigvals(model.a).real.max() < 1e-3
     assert model.inputs == ("valve_command.elbow", "valve_command.wrist")
-    start = equilibrium(rig, 0.8, joint="elbow", chamber="elbow", initial=start)
-    moves_alike(rig, model, start, lambda t, k: (1e-3 + 1e-3 * k) * np.sin(30.0 * t) ** 2, low=5e-3)
 
 
 def test_dry_friction_at_rest_and_in_motion_have_regions_of_their_own(rig):

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs import cli, rigs
+from pamrs import rigs
 from pamrs.design import lift
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint, Rig
+from tests.scripts import command
 from tests.tables import rows_of
 
 PSI, LB = 6894.757293168361, 0.45359237
@@ -275,9 +276,7 @@ def test_the_supply_is_the_default_and_the_text_is_as_the_numbers(elbow):
 
 
 def run(capsys, *words):
-    code = cli.main(["lift", *map(str, words)])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
+    return command(capsys, "lift", *words)
 
 
 def test_command_prints_and_writes(capsys, tmp_path):

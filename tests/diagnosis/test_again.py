@@ -24,7 +24,7 @@ BOTH = LEAKING.with_effect("muscle_hysteresis")
 @pytest.fixture(scope="module")
 def recordings() -> list[pamrs.Recording]:
     """Of a plant that leaks and whose muscle has friction."""
-    return again.case(BOTH, SHOULDER).recordings
+    return again.case(BOTH, SHOULDER, 700).recordings
 
 
 def diagnosed(recordings: list[pamrs.Recording], model: pamrs.Rig) -> pamrs.Diagnosis:
@@ -80,7 +80,7 @@ def test_nothing_is_missing_where_the_model_holds_all(recordings) -> None:
 
 
 def test_an_effect_that_the_plant_does_not_have_is_a_wrong_parameter() -> None:
-    found = pamrs.diagnose(again.case(SHOULDER, LEAKING))
+    found = pamrs.diagnose(again.case(SHOULDER, LEAKING, 900))
     assert found.verdict == "parameters"
     (wrong,) = found.wrong_parameters
     assert wrong.name == "leak_muscle.conductance"

@@ -85,7 +85,7 @@ def test_a_valve_lets_through_what_its_openings_do_and_not_their_mean() -> None:
 
 
 def test_only_fast_recordings_are_averaged_and_no_further_than_needed() -> None:
-    one = run()
+    one = run(duration=16.0)
     blocks = available_blocks(pamrs.rigs.shoulder(), NAMES)
     few = replace(SETTINGS, ample_samples=40)
     assert averaged_to_need([one], blocks, "a", SETTINGS) == ([one], [1])

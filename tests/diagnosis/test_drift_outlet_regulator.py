@@ -4,6 +4,7 @@ named.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +29,10 @@ def diagnosed(rig: Rig, recordings: list[Recording]) -> pamrs.Diagnosis:
 
 
 def steps_of(rig: Rig, role: str, seed: int) -> Recording:
-    """Eight seconds at 200 Hz of steps of the set pressure."""
+    """Five seconds at 200 Hz of steps of the set pressure."""
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 8.0, 0.005)
-    levels = np.concatenate([[0.5e5], rng.uniform(0.5e5, 6e5, 15)])  # at rest before the log
+    time = np.arange(0.0, 5.0, 0.005)
+    levels = np.concatenate([[0.5e5], rng.uniform(0.5e5, 6e5, 9)])  # at rest before the log
     command = levels[(time / 0.5).astype(int)]
     run = pamrs.simulate(rig, supply_command=command, sample_time=0.005)
     channels = {"supply_command": command} | {name: run[name] for name in NOISE}
@@ -76,7 +77,9 @@ def test_an_outlet_that_is_laminar_is_no_lag_of_the_gauge() -> None:
 
 
 def test_a_load_cell_that_drifts_is_no_modulus_that_does() -> None:
-    found = pamrs.diagnose(load_case(FAULTS / "06_load_cell_drift"))
+    case = load_case(FAULTS / "06_load_cell_drift")
+    shorter = [recording.between(None, 35.0) for recording in case.recordings]
+    found = pamrs.diagnose(replace(case, recordings=shorter))
     best = max(found.probabilities, key=lambda key: found.probabilities[key])
     assert "load_cell_drift" in best.split("+"), found
 

@@ -13,6 +13,7 @@ from pamrs.diagnosis.prepare import available_blocks, begun_alike, prepare, resi
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig
+from tests.diagnosis import slopes
 from tests.diagnosis.noisy import noisy
 
 SETTINGS = DiagnosisSettings()
@@ -70,19 +71,8 @@ def test_what_is_wrong_along_the_hose_shows(wrong: dict[str, float], seen: bool)
 def test_sensitivities_are_those_of_differences() -> None:
     prepared = prepare(opened(RIG, "fit", 0, 3e5), RIG, SETTINGS)
     block = available_blocks(RIG, CHANNELS)[1]
-    for name in ("line.length", "line.diameter", "line.alpha", "chamber.right.alpha_in"):
-        value = RIG.parameter(name).value
-        slope = residual(block, core_rig(RIG), prepared, [name]).jacobian
-        assert slope is not None
-        low, high = (
-            residual(
-                block, core_rig(RIG.with_parameters({name: value * f})), prepared, [name]
-            ).value
-            for f in (1.0 - 1e-4, 1.0 + 1e-4)
-        )
-        wanted = -(high - low) / (2e-4 * value)
-        size = float(np.abs(wanted).max())
-        np.testing.assert_allclose(slope[:, 0], wanted, atol=2e-2 * size)
+    names = ("line.length", "line.diameter", "line.alpha", "chamber.right.alpha_in")
+    slopes.are_those_of_differences(block, RIG, prepared, *names)
 
 
 BALANCED = parse_rig(pamrs.rigs.template("long_tube"))

@@ -179,7 +179,7 @@ def test_wrong_limits_are_named(text: str, tmp_path) -> None:
 
 def regulated(name: str, role: str, seed: int) -> Recording:
     """A joint whose recorded command is not what its regulator got: nothing explains that."""
-    rng, time = np.random.default_rng([7, seed]), 0.005 * np.arange(1400)
+    rng, time = np.random.default_rng([7, seed]), 0.005 * np.arange(800)
     command = 2e5 + 0.8e5 * np.sin(2.0 * np.pi * 0.2 * (1.0 + 0.4 * seed) * time + seed)
     command += 0.5e5 * np.sign(np.sin(2.0 * np.pi * 0.15 * time))
     run = pamrs.simulate(steady(), supply_command=command, sample_time=0.005)

@@ -45,7 +45,7 @@ def run(
     dt: float = 0.005,
     noise: float = 1.0,
     bits: float = 0.0,
-    duration: float = 16.0,
+    duration: float = 12.0,
     role: str = "fit",
 ) -> Recording:
     """A shoulder under a command, with noise of its own; quantised to multiples of the noise."""

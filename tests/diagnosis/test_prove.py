@@ -206,6 +206,8 @@ prove({str(home)!r}, jobs=2, command=[sys.executable, "-c", {slow!r}])
         [sys.executable, "-c", program],
         env={**os.environ, "TMPDIR": str(temporary), "PYTHONPATH": paths},
         stderr=subprocess.DEVNULL,
+        # whoever runs the tests may ignore it, and a child would go on ignoring it
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),
     ) as process:
         began = time.monotonic()
         while not list(home.glob("results/*/out.json.pid")) and time.monotonic() - began < 60.0:

@@ -37,7 +37,7 @@ def pulled(true: pamrs.Rig, tare: float = 0.0) -> pamrs.Case:
     """
     found = []
     for k, name in enumerate(ROLES):
-        time = np.arange(0.0, 20.0, DT)
+        time = np.arange(0.0, 10.0, DT)
         length = REST * (
             0.88
             + 0.06 * np.sin(2 * np.pi * (0.11 + 0.05 * k) * time)

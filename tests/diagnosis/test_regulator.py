@@ -20,10 +20,10 @@ TEXT = text_of(__file__, "regulated_limits")
 
 
 def recorded(rig: Rig, role: str, seed: int) -> Recording:
-    """Twelve seconds at 200 Hz of steps of the set pressure."""
+    """Eight seconds at 200 Hz of steps of the set pressure."""
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 12.0, 0.005)
-    levels = np.concatenate([[0.5e5], rng.uniform(0.5e5, 6e5, 23)])  # at rest before the log
+    time = np.arange(0.0, 8.0, 0.005)
+    levels = np.concatenate([[0.5e5], rng.uniform(0.5e5, 6e5, 15)])  # at rest before the log
     command = levels[(time / 0.5).astype(int)]
     run = pamrs.simulate(rig, supply_command=command, sample_time=0.005)
     channels = {"supply_command": command}

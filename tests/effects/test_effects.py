@@ -84,32 +84,19 @@ def test_one_effect_has_no_neutral_value() -> None:
     assert [e for e in EFFECTS if not EFFECTS[e].neutral()] == ["heat_transfer"]
 
 
-@pytest.mark.parametrize("effect", sorted(EFFECTS))
-def test_a_simulator_goes_on_bit_for_bit(effect: str) -> None:
-    rig = rig_for(effect).with_effect(effect)
-    whole, first = (pamrs.Simulator(rig, sample_time=0.01, initial=START) for _ in range(2))
-    expected = whole.run(COMMAND)
-    first.run(COMMAND[:31])
-    second = pamrs.Simulator(rig, sample_time=0.01, initial=START)
-    second.restore(first.state)
-    found = second.run(COMMAND[31:])
-    for channel, values in found.items():
-        np.testing.assert_array_equal(values, expected[channel][31:])
-
-
-def test_all_at_once_run_and_restart() -> None:
-    rig = with_outlet()
+@pytest.mark.parametrize("supply", ["tank", "regulator"])
+def test_all_at_once_run_and_restart_bit_for_bit(supply: str) -> None:
+    rig = with_outlet() if supply == "tank" else regulated()
     for effect in EFFECTS:
-        if not effect.startswith("supply_regulator"):  # the shoulder has a tank
+        if effect.startswith("supply_regulator") == (supply == "regulator"):
             rig = rig.with_effect(effect)
     whole, first = (pamrs.Simulator(rig, sample_time=0.01, initial=START) for _ in range(2))
     expected = whole.run(COMMAND)
     first.run(COMMAND[:17])
     second = pamrs.Simulator(rig, sample_time=0.01, initial=START)
     second.restore(first.state)
-    np.testing.assert_array_equal(
-        second.run(COMMAND[17:])["joint_angle"], expected["joint_angle"][17:]
-    )
+    for channel, values in second.run(COMMAND[17:]).items():
+        np.testing.assert_array_equal(values, expected[channel][17:], err_msg=channel)
 
 
 FORMS = [(effect, form.name) for effect in sorted(EFFECTS) for form in EFFECTS[effect].forms[1:]]

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pamrs import cli, load_rig, rigs
+from pamrs import load_rig, rigs
 from pamrs.fit import ForceMap, compare_models, fit_muscle
 from pamrs.fit import report as pages
 from pamrs.fit.remarks import headline, limits, meaning, percent, residual_pattern
 from pamrs.rig import Muscle
 from tests.fit.cases import named
+from tests.scripts import command
 from tests.tables import rows_of
 
 REST = 0.3
@@ -206,9 +207,7 @@ def test_the_bladder_share_is_gas_force_minus_model(fit, muscle):
 
 
 def run(capsys, *words):
-    code = cli.main(["fit", "muscle", *(str(word) for word in words)])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
+    return command(capsys, "fit", "muscle", *words)
 
 
 def test_command_writes_everything(capsys, table, tmp_path):

@@ -15,18 +15,19 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.reference import GeometryReference, MuscleReference, shoulder  # noqa: E402
+from tests.reference import GeometryReference, MuscleReference  # noqa: E402
 
 DATA = Path(__file__).resolve().parent / "data"
 INCH = 0.0254
+AMBIENT = 101325.0
 MODULUS_SLOPE = [3.0, -0.35, 0.0, 0.0]
 MODULUS_OFFSET = [1.15e6, -0.15e6, 0.0, 0.0]
 PRESSURES = {"force_1bar_N": 1e5, "force_4bar_N": 4e5, "force_8bar_N": 8e5}
 CONTRACTIONS = [-0.02, -0.01, -0.005, 0.0, 0.001, 0.01, 0.03, 0.07, 0.12, 0.18, 0.24, 0.3, 0.36]
 SAMPLE_TIME = 0.005
 INITIAL = {
-    "muscle_pressure": 2.6e5 + 101325.0,
-    "supply_pressure": 13.8e5 + 101325.0,
+    "muscle_pressure": 2.6e5,
+    "supply_pressure": 13.8e5,
     "joint_angle": math.radians(40.0),
     "joint_rate": 0.0,
 }
@@ -66,8 +67,20 @@ def muscle_rows() -> list[list[str]]:
     return rows
 
 
-def main() -> None:
-    """Write both files."""
+def write(name: str, columns: dict[str, NDArray[np.float64]]) -> None:
+    """Write one trajectory."""
+    np.savetxt(
+        DATA / name,
+        np.column_stack(list(columns.values())),
+        fmt="%.12e",
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+    )
+
+
+def muscles() -> None:
+    """Write ``muscle_static.csv``."""
     DATA.mkdir(exist_ok=True)
     with (DATA / "muscle_static.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -82,23 +95,25 @@ def main() -> None:
         ]
         writer.writerow(names)
         writer.writerows(muscle_rows())
-    run = shoulder().simulate(smooth_command(), SAMPLE_TIME, INITIAL, rtol=1e-12)
+
+
+def smooth_shoulder() -> None:
+    """Write ``shoulder_smooth.csv``: the shoulder under the smooth command."""
+    from tests.runs import Run
+
+    command = smooth_command()
+    commands = {"valve_command": command}
+    run = Run("shoulder", SAMPLE_TIME, command.size, INITIAL, commands).with_struts
+    found = run.reference()
     columns = {
         "time_s": run.time,
-        "valve_command_V": run.valve_command,
-        "muscle_pressure_abs_Pa": run.muscle_pressure,
-        "supply_pressure_abs_Pa": run.supply_pressure,
-        "joint_angle_rad": run.joint_angle,
-        "joint_rate_rad_s": run.joint_rate,
+        "valve_command_V": command,
+        "muscle_pressure_abs_Pa": found["muscle_pressure"] + AMBIENT,
+        "supply_pressure_abs_Pa": found["supply_pressure"] + AMBIENT,
+        "joint_angle_rad": found["joint_angle"],
+        "joint_rate_rad_s": found["joint_rate"],
     }
-    np.savetxt(
-        DATA / "shoulder_smooth.csv",
-        np.column_stack(list(columns.values())),
-        fmt="%.12e",
-        delimiter=",",
-        header=",".join(columns),
-        comments="",
-    )
+    write("shoulder_smooth.csv", columns)
 
 
 #: Rigs of several blocks that have golden trajectories.
@@ -113,17 +128,10 @@ def networks() -> None:
 
     for name in NETWORKS:
         run = RUNS[name].with_struts
-        columns = {"time": run.time, **run.commands, **run.reference()}
-        np.savetxt(
-            DATA / f"network_{name}.csv",
-            np.column_stack(list(columns.values())),
-            fmt="%.12e",
-            delimiter=",",
-            header=",".join(columns),
-            comments="",
-        )
+        write(f"network_{name}.csv", {"time": run.time, **run.commands, **run.reference()})
 
 
 if __name__ == "__main__":
-    main()
+    muscles()
+    smooth_shoulder()
     networks()

@@ -3,23 +3,13 @@ with pamrs.
 
 It is slow and plain on purpose: roots by ``brentq``, integrals by ``quad``, trajectories by an
 adaptive eighth-order method. ``geometry`` and ``muscle`` describe one muscle, ``gas`` the orifice
-and the valve, ``plant`` the whole one-link arm and the sealed rigid chamber.
+and the valve, ``plant`` what muscles give a one-link arm at rest, ``network`` whole rigs in motion.
 """
 
 from .gas import Valve, orifice_flow
 from .geometry import GeometryReference, Shape
 from .muscle import MuscleReference
-from .plant import (
-    Arm,
-    Chamber,
-    Gas,
-    Joint,
-    Plant,
-    Trajectory,
-    sealed_chamber,
-    shoulder,
-    with_overrides,
-)
+from .plant import Arm, Chamber, Gas, Joint, Plant, shoulder
 
 __all__ = [
     "Arm",
@@ -30,10 +20,7 @@ __all__ = [
     "MuscleReference",
     "Plant",
     "Shape",
-    "Trajectory",
     "Valve",
     "orifice_flow",
-    "sealed_chamber",
     "shoulder",
-    "with_overrides",
 ]

@@ -1,18 +1,13 @@
-"""One-link arm driven by parallel muscles through a tendon joint, and the sealed rigid chamber."""
+"""One-link arm on parallel muscles and a tendon joint: torque and volume at an angle."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import Any
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
 
-from .gas import Valve, orifice_flow
 from .geometry import GeometryReference
 from .muscle import MuscleReference, MuscleTable
 
@@ -117,25 +112,11 @@ class Arm:
 
 
 @dataclass(frozen=True)
-class Trajectory:
-    """Sampled states; pressures absolute in Pa, angle in rad, rate in rad/s; every array (n,)."""
-
-    time: NDArray[np.float64]
-    valve_command: NDArray[np.float64]
-    muscle_pressure: NDArray[np.float64]
-    supply_pressure: NDArray[np.float64]
-    joint_angle: NDArray[np.float64]
-    joint_rate: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
 class Plant:
-    """Tank, valve, muscles, tendon joint and arm."""
+    """Muscles with their chamber, tendon joint and arm."""
 
     muscle: MuscleReference
-    supply_volume: float = 0.015
     gas: Gas = field(default_factory=Gas)
-    valve: Valve = field(default_factory=Valve)
     chamber: Chamber = field(default_factory=Chamber)
     joint: Joint = field(default_factory=Joint)
     arm: Arm = field(default_factory=Arm)
@@ -159,111 +140,10 @@ class Plant:
         force = self.table(e, muscle_pressure - self.gas.ambient_pressure)[0]
         return self.muscle.count * force * self.joint.moment_arm(angle)
 
-    def derivative(self, state: NDArray[np.float64], command: float) -> list[float]:
-        """Time derivative of (muscle pressure, supply pressure, angle, rate); pressures
-        absolute.
-        """
-        pressure, supply, angle, rate = state.tolist()
-        gas, rest, n = self.gas, self.muscle.geometry.rest_length, self.muscle.count
-        moment_arm = self.joint.moment_arm(angle)
-        force, volume_one, slope = self.table(
-            self.joint.contraction(angle) / rest, pressure - gas.ambient_pressure
-        )
-        volume = n * volume_one + self.chamber.dead_volume
-        volume_rate = n * slope * moment_arm * rate / rest
-        area = self.valve.area(command)
-        inflow = outflow = 0.0
-        props = (gas.temperature, gas.gas_constant, gas.heat_capacity_ratio)
-        if area > 0.0:
-            inflow = orifice_flow(area, supply, pressure, *props)
-        elif area < 0.0:
-            outflow = orifice_flow(-area, pressure, gas.ambient_pressure, *props)
-        rt = gas.gas_constant * gas.temperature
-        chamber = self.chamber
-        pressure_rate = (
-            rt * (chamber.alpha_in * inflow - chamber.alpha_out * outflow)
-            - chamber.alpha * pressure * volume_rate
-        ) / volume
-        torque = n * force * moment_arm + self.joint.stop_torque(angle, rate)
-        return [
-            pressure_rate,
-            -rt * inflow / self.supply_volume,
-            rate,
-            self.arm.acceleration(angle, rate, torque),
-        ]
-
-    def _rhs(self, _: float, state: NDArray[np.float64], command: float) -> list[float]:
-        return self.derivative(state, command)
-
-    def simulate(
-        self,
-        valve_command: ArrayLike,
-        sample_time: float,
-        initial: Mapping[str, float],
-        rtol: float = 1e-10,
-    ) -> Trajectory:
-        """Integrate adaptively, restarting at every sample, where the command may jump.
-
-        Parameters
-        ----------
-        valve_command : array_like (n,)
-            Volts; entry k is held from sample k to sample k + 1.
-        sample_time : float
-            Seconds between samples.
-        initial : mapping
-            ``muscle_pressure`` and ``supply_pressure`` (absolute, Pa), ``joint_angle`` (rad) and
-            ``joint_rate`` (rad/s).
-        """
-        command = np.asarray(valve_command, dtype=float)
-        names = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
-        states = np.empty((command.size, 4))
-        states[0] = [initial[name] for name in names]
-        atol = [rtol * scale for scale in (1e5, 1e6, 1.0, 1.0)]
-        for k in range(command.size - 1):
-            solution = solve_ivp(
-                partial(self._rhs, command=float(command[k])),
-                (0.0, sample_time),
-                states[k],
-                method="DOP853",
-                rtol=rtol,
-                atol=atol,
-                first_step=min(1e-3, sample_time),
-            )
-            if not solution.success:
-                raise RuntimeError(f"integration failed in sample {k}: {solution.message}")
-            states[k + 1] = solution.y[:, -1]
-        return Trajectory(
-            sample_time * np.arange(command.size, dtype=np.float64), command, *states.T.copy()
-        )
-
 
 def shoulder() -> Plant:
-    """Return the nominal shoulder rig: six one-inch latex muscles and a 15 L tank."""
+    """Return the nominal shoulder: six one-inch latex muscles."""
     geometry = GeometryReference(0.276, 0.0254, math.radians(73.5), 0.003175)
     return Plant(
         MuscleReference(geometry, [3.0, -0.35, 0.0, 0.0], [1.15e6, -0.15e6, 0.0, 0.0], 1.0, 6)
     )
-
-
-def with_overrides(plant: Plant, overrides: Mapping[str, float]) -> Plant:
-    """Return `plant` with scalars replaced by dotted name: ``{"arm.payload": 10.0}`` (SI)."""
-    groups: dict[str, dict[str, Any]] = {}
-    for name, value in overrides.items():
-        block, key = name.split(".")
-        groups.setdefault(block, {})[key] = value
-    for block, values in groups.items():
-        if block == "supply":
-            plant = replace(plant, supply_volume=values["volume"])
-        elif block == "muscle":
-            own = {k: v for k, v in values.items() if k in ("count", "modulus_scale")}
-            shape = {k: v for k, v in values.items() if k not in own}
-            geometry = replace(plant.muscle.geometry, **shape)
-            plant = replace(plant, muscle=replace(plant.muscle, geometry=geometry, **own))
-        else:
-            plant = replace(plant, **{block: replace(getattr(plant, block), **values)})
-    return plant
-
-
-def sealed_chamber(pressure: float, times: ArrayLike) -> NDArray[np.float64]:
-    """Pressure of a rigid chamber with no opening and no effect: it stays."""
-    return np.full(np.shape(times), pressure)

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 import pamrs
 from tests.reference.geometry import GeometryReference
 from tests.reference.muscle import MuscleReference
-from tests.reference.plant import shoulder, with_overrides
+from tests.reference.plant import shoulder
 
 CYCLES = 1000
 AMBIENT = 101325.0
@@ -26,7 +26,7 @@ def frictionless() -> pamrs.Rig:
 
 def potential(angle: np.ndarray, pressure: float, start: float) -> np.ndarray:
     """Of weight, rubber and the air that is shut in [J] by the reference, over angles."""
-    plant = with_overrides(shoulder(), {"arm.viscous": 0.0, "arm.coulomb": 0.0})
+    plant = shoulder()
     muscle, rest = plant.muscle, plant.muscle.geometry.rest_length
 
     def volume(bent: float) -> float:
