@@ -8,10 +8,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate
+from pamrs.diagnosis.evidence._weighing import may_be_inside
 from pamrs.diagnosis.fit import Problem, form_in, spread_over_pieces
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
 
-# stated deviations within which a size is not determined; a stated one is twice the pieces'
+# stated deviations within which a size, or that a value is wrong, is not determined; a stated one
+# is twice the pieces'
 _DETERMINED_STDS = 1.0
 
 
@@ -29,12 +31,13 @@ def with_stated_std(problem: Problem, group: BlockGroup, candidate: Candidate) -
 
 
 def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
-    """A group in which a name alone, whose values are not told from none by the standard deviations
-    that are stated, has half of its probability.
+    """A group in which a name alone, whose values are not told from none (a wrong value: from one
+    inside its tolerances) by the standard deviations that are stated, has half of its probability,
+    and none where no more than noise was left.
 
-    The other half falls to ``unlisted``: something acts there, and which effect was not told (to
-    nothing, where no more than noise was left). Whether a set needs such a name is told by the
-    evidence of the set without it.
+    The rest falls to ``unlisted``: something acts there, and which effect was not told (to nothing,
+    where no more than noise was left). Whether a set needs such a name is told by the evidence of
+    the set without it.
 
     Parameters
     ----------
@@ -49,17 +52,18 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
         With other probabilities; the same where every single name is determined.
     """
     settings = problem.settings
-    if group.mismatch is None:
-        return group
     found = dict(group.probabilities)
+    lost = 1.0 if group.mismatch is None else 0.5
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
-        if len(candidate.terms) != 1 or not candidate.effects or chance < settings.in_set:
+        if len(candidate.terms) != 1 or chance < settings.in_set:
             continue
-        if undetermined_effects(with_stated_std(problem, group, candidate)):
-            found[candidate.hypothesis] -= 0.5 * chance
+        stated = with_stated_std(problem, group, candidate)
+        inside = may_be_inside(stated, settings.most_tolerances, _DETERMINED_STDS)
+        if inside or undetermined_effects(stated):
+            found[candidate.hypothesis] -= lost * chance
             to = _without_name(group)
-            found[to] = found.get(to, 0.0) + 0.5 * chance
+            found[to] = found.get(to, 0.0) + lost * chance
     return replace(group, probabilities=found)
 
 
@@ -114,4 +118,4 @@ def put_aside(group: BlockGroup, hypothesis: Hypothesis) -> BlockGroup:
 
 def _without_name(group: BlockGroup) -> Hypothesis:
     """What is left of a name that does not hold: a signature below the noise is nothing then."""
-    return UNDECIDED if group.below_noise else UNLISTED
+    return UNDECIDED if group.below_noise or group.mismatch is None else UNLISTED

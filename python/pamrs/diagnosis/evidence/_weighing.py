@@ -309,10 +309,7 @@ def is_absent(candidate: Candidate, walls: float) -> bool:
     well. The shape is taken as it was fitted: that of what is not there is anything.
     """
     found = candidate.fit
-    if any(
-        abs(found.moved[name]) - walls < _SAME_STDS * found.std.get(name, 0.0) / found.scales[name]
-        for name in candidate.wrong
-    ):
+    if may_be_inside(candidate, walls, _SAME_STDS):
         return True
     if found.events is not None:
         return False
@@ -332,6 +329,17 @@ def is_absent(candidate: Candidate, walls: float) -> bool:
         if not certain and chi2.sf(distance, sum(sizes)) >= chi2.sf(_SAME_STDS**2, 1):
             return True
     return False
+
+
+def may_be_inside(candidate: Candidate, walls: float, stds: float) -> bool:
+    """Whether a value that is called wrong may be inside its tolerances, so many standard
+    deviations off.
+    """
+    found = candidate.fit
+    return any(
+        abs(found.moved[name]) - walls < stds * found.std.get(name, 0.0) / found.scales[name]
+        for name in candidate.wrong
+    )
 
 
 def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
