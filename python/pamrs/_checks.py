@@ -44,13 +44,15 @@ def check_kind(name: str, value: object, kind: type | tuple[type, ...], needed: 
         raise ParameterError(f"{name} is a {type(value).__name__}; {needed} is needed")
 
 
-def check_names(what: str, names: Iterable[str], known: Iterable[str]) -> None:
-    """Refuse names that are none of those known; the error has them all."""
+def check_names(what: str, names: Iterable[str], known: Iterable[str], kind: str) -> None:
+    """Refuse names that are none of those known; the error says of what kind they have to be, and
+    lists them.
+    """
     there = list(known)
     for name in names:
         if name not in there:
             listed = ", ".join(map(repr, there)) or "none"
-            raise ParameterError(f"{what} has {name!r}, which is not there; there are: {listed}")
+            raise ParameterError(f"{what} has {name!r}, which is no {kind}; there are: {listed}")
 
 
 def as_column(name: str, values: Any) -> NDArray[np.float64]:
@@ -60,7 +62,7 @@ def as_column(name: str, values: Any) -> NDArray[np.float64]:
     without_units(name, values)
     try:
         column = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise refused(name, values, "numbers are needed") from None
     if column.ndim != 1 or column.size == 0:
         raise ParameterError(f"{name} has the shape {column.shape}; (n,) with n >= 1 is needed")

@@ -268,6 +268,35 @@ def test_a_name_whose_value_is_not_determined_does_not_lead() -> None:
     assert left == chances | {alone.hypothesis: 0.15, UNLISTED: 0.25}
 
 
+@pytest.mark.parametrize(
+    ("below_noise", "std", "kept"),
+    [(False, 0.5, 0.9), (False, 2.5, 0.0), (True, 0.5, 0.9), (True, 2.5, 0.0)],
+)
+def test_a_wrong_value_that_is_not_determined_is_no_name_in_noise(
+    monkeypatch: pytest.MonkeyPatch, std: float, kept: float, *, below_noise: bool
+) -> None:
+    """Five tolerances off: beyond the third by less than one standard deviation, or by four."""
+    name = "chamber.dead_volume"
+    problem, own = leak_group(3e-9)
+    base = own.candidates[0]
+    moved = replace(base.fit, moved=base.fit.moved | {name: 5.0})
+    tolerance = moved.scales[name]
+    monkeypatch.setattr(
+        "pamrs.diagnosis.evidence._determined.spread_over_pieces",
+        lambda problem, found: {name: std * tolerance},
+    )
+    wrong = replace(base, fit=moved, wrong=(name,))
+    group = replace(
+        own,
+        candidates=[base, wrong],
+        probabilities={wrong.hypothesis: 0.9, UNDECIDED: 0.1},
+        mismatch=own.mismatch if below_noise else None,
+        below_noise=below_noise,
+    )
+    left = drop_undetermined(group, problem).probabilities
+    assert left == pytest.approx({wrong.hypothesis: kept, UNDECIDED: 1.0 - kept})
+
+
 def test_events_of_another_effect_determine_no_value() -> None:
     problem, own = leak_group(1e-13)
     leak = own.candidates[1]

@@ -181,6 +181,7 @@ def test_what_is_still_more_than_noise_is_not_explained() -> None:
     assert chances(1.4, 1.27)["leak_muscle"] < 0.5
     assert chances(1.4, 1.1)["leak_muscle"] > 0.7
     assert chances(2.0, 1.7)["unlisted"] > 0.5
+    assert 0.4 < chances(2.0, 1.5)["leak_muscle"] < 0.6
     # a noise level that was taken too low is the more probable cause of hardly anything
     assert chances(1.1, 1.05)[""] > 0.7
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,9 +16,11 @@ from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, possible_gai
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.evidence._verdicts import _capped
 from pamrs.diagnosis.evidence._weighing import loss_by_values
-from pamrs.diagnosis.fit import Events, Fit, Problem, fits
+from pamrs.diagnosis.fit import Events, Fit, Problem, Start, fits
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.screen import Score
+from pamrs.diagnosis.search._hypotheses import _shortlist
 from pamrs.effects import EFFECTS, NONE, UNLISTED, Hypothesis, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
@@ -249,3 +252,37 @@ def test_a_wrong_value_is_told_from_one_inside_its_tolerances(std: float, *, nam
     wrong = with_wrong(hypothesis({}, 1e-4), MODULUS)
     wrong = replace(wrong, fit=replace(wrong.fit, std={MODULUS: std * wrong.fit.scales[MODULUS]}))
     assert (weighed(wrong).get(MODULUS, 0.0) > 0.5) == named
+
+
+def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
+    """Three effects of two starts each: only that with a size gets its other start."""
+    asked: list[tuple[str, float]] = []
+    keys = {**CREEP, **DAMPING, "external_torque": {"torque": (5.0, 0.1)}}
+
+    def shortly(starts: list[Start], _: Fit) -> Candidate:
+        (start,) = starts
+        effect = start.effect.id
+        asked.append((effect, start.free["size"]))
+        size = 1.0 if effect == "muscle_rate_damping" else 0.0
+        return hypothesis({effect: {n: (size * v, s) for n, (v, s) in keys[effect].items()}}, 0.5)
+
+    trial = SimpleNamespace(
+        settings=SETTINGS,
+        fit_shortly=shortly,
+        start_of=lambda fit, effect: Start(effect, {}, {}, (), False),
+    )
+    search = SimpleNamespace(
+        trial=trial, start=hypothesis({}, 1.0), weight=lambda candidate: candidate.misfit
+    )
+    ranked = {
+        term: [
+            Score(term, Start(term, {"size": k}, {}, (), False), 1.0, 1.0, np.zeros(0))
+            for k in (1.0, 2.0)
+        ]
+        for term in terms(*keys)
+    }
+    found, _, _ = _shortlist(search, [[term] for term in ranked], ranked)
+    assert [term.id for term in found] == ["muscle_rate_damping"]
+    assert sorted(asked) == sorted(
+        [(effect, 1.0) for effect in keys] + [("muscle_rate_damping", 2.0)]
+    )

@@ -457,7 +457,6 @@ def _noise(text: str, data: ForceMap) -> float:
 
 
 def _filter(text: str) -> tuple[str, str]:
-
     column, equals, value = text.partition("=")
     if not (column.strip() and equals and value.strip()):
         raise refused("--where", text, "COLUMN=VALUE is needed")

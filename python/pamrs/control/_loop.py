@@ -421,7 +421,7 @@ def _recorded(rig: Rig, channels: Iterable[str] | None, tracked: Iterable[str]) 
     if channels is None:
         return known
     wanted = list(dict.fromkeys([*tracked, *channels]))
-    check_names("channels", wanted, known)
+    check_names("channels", wanted, known, "channel of the plant")
     return wanted
 
 
@@ -444,7 +444,7 @@ def tracked_of(rig: Rig, measured: Mapping[str, str] | None) -> tuple[str, str]:
         If a channel is not known, or there is no such joint.
     """
     known = core_rig(rig).channels
-    check_names("measured", (measured or {}).values(), known)
+    check_names("measured", (measured or {}).values(), known, "channel of the plant")
     angle = (measured or {}).get("joint_angle", "joint_angle")
     if angle not in known:
         raise ParameterError(

@@ -165,7 +165,7 @@ class RigController(SampledController):
         self.law = _Law(law, len(model.joints))
         self._commanded = getattr(law, "motion", "measured") == "commanded"
         given = {model.joints[0]: shares} if isinstance(shares, Share) else dict(shares or {})
-        check_names("shares", given, model.joints)
+        check_names("shares", given, model.joints, "joint of the rig")
         self._shares = [self._share(name, given.get(name), stiffness) for name in model.joints]
         self.shares = _Named(dict(zip(model.joints, self._shares, strict=True)))
         chosen = ("flow" if self._commanded else "loop") if air is None else air
@@ -198,7 +198,7 @@ class RigController(SampledController):
 
     def _share(self, joint: str, given: Share | None, stiffness: Any) -> Share:
         if isinstance(stiffness, Mapping):
-            check_names("stiffness", stiffness, self.joints)
+            check_names("stiffness", stiffness, self.joints, "joint of the rig")
             stiffness = stiffness.get(joint)
         torques, limit = self.model.torques_of(joint), self.model.pressure_limit
         if given is not None:
@@ -222,7 +222,7 @@ class RigController(SampledController):
     ) -> Any:
         model, feed = self.model, group.feed
         if isinstance(chosen, Mapping):
-            check_names("air", chosen, [g.chamber for g in model.groups])
+            check_names("air", chosen, [g.chamber for g in model.groups], "chamber with muscles")
             if group.chamber in chosen:
                 return chosen[group.chamber]
             chosen = "flow" if self._commanded else "loop"

@@ -171,7 +171,8 @@ class Reader:
 
 
 def _there(sample: Measurement, channel: str) -> Value:
-    check_names("sensors", [channel], sample)
+    if channel not in sample:
+        check_names("sensors", [channel], sample, "channel of the plant")
     return sample[channel]
 
 

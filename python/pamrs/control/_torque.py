@@ -498,7 +498,7 @@ def active_groups(rig: Rig, active: Sequence[str] | None) -> tuple[Group, ...]:
     if active is None:
         return groups
     there = [group.chamber for group in groups]
-    check_names("active", active, there)
+    check_names("active", active, there, "chamber with muscles")
     return tuple(group for group in groups if group.chamber in active)
 
 

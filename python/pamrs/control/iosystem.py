@@ -82,7 +82,7 @@ def iosystem(
     if not inputs:
         raise ParameterError(f"rig {rig.name!r} has no command; a valve or a regulator is needed")
     channels = list(compiled.channels if outputs is None else outputs)
-    check_names("outputs", channels, compiled.channels)
+    check_names("outputs", channels, compiled.channels, "channel of the rig")
 
     def updated(_: float, state: Array, command: Array, __: Mapping[str, Any]) -> Array:
         simulator.restore(state)

@@ -345,7 +345,7 @@ class JointProblem:
 
 def _checked_bounds(given: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     """Every length with its bounds."""
-    check_names("bounds", given, LENGTHS)
+    check_names("bounds", given, LENGTHS, "length of the joint")
     bounds = {}
     for name in LENGTHS:
         pair = given.get(name, DEFAULT_BOUNDS[name])

@@ -211,7 +211,7 @@ def _chosen(data: ForceMap, levels: Sequence[float] | None) -> Mask:
 def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) -> tuple[Free, ...]:
     known = blank.parameters
     for name in names:
-        one_of("a name of free", name, GEOMETRY)
+        one_of("free", name, GEOMETRY)
         if not has_effect(name, blank.model, blank.geometry):
             raise ParameterError(
                 f"free: {name!r} has no effect on the model {blank.model} with {blank.geometry} "
@@ -231,7 +231,7 @@ def _is_number(value: object) -> bool:
 def _tolerances(tolerance: Mapping[str, float] | None) -> dict[str, float]:
     allowed = (*GEOMETRY, *COEFFICIENTS)
     for name, value in (tolerance or {}).items():
-        one_of("a name of tolerance", name, allowed)
+        one_of("tolerance", name, allowed)
         if not (_is_number(value) and value > 0.0):
             raise refused(
                 f"tolerance: {name}", value, "a positive number is needed (infinite for no prior)"

@@ -450,8 +450,8 @@ class Reader:
             self.refuse(
                 f"{label}.error",
                 extra["error"],
-                f"{_OWN!r}, another value "
-                "in each recording; the known value of one recording is given in case.toml",
+                f"{_OWN!r}, another value in each recording; the known value of one recording is "
+                "given in case.toml",
             )
         for word in ("tol", "unknown", "std"):
             if word in extra:

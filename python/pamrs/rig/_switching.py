@@ -32,7 +32,8 @@ def new_entry(
         )
     info = EFFECTS[effect]
     forms = [known.name for known in info.forms]
-    one_of("form", form, ("", *forms), also=f" for {effect}")
+    if form != "":
+        one_of("form", form, forms, also=f" for {effect}")
     place = block_name(info.at, at)
     given = {} if parameters is None else checked_table("parameters", parameters)
     spread = {} if std is None else checked_table("std", std)

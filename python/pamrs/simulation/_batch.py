@@ -462,7 +462,7 @@ class Batch:
                 known if channels is None else [channels] if isinstance(channels, str) else channels
             )
         )
-        check_names("channels", names, known)
+        check_names("channels", names, known, "channel of the rig")
         rows = total // every + 1
         if rows * len(self) * len(names) > MOST_NUMBERS:
             most = MOST_NUMBERS // (len(self) * len(names))

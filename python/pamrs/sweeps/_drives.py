@@ -97,7 +97,7 @@ def metric_of(name: str, given: Any) -> Metric:
             given,
             "('final', 'joint_angle') or ('squared_error', 'joint_angle', reference) is needed",
         )
-    one_of(f"metrics[{name!r}]", parts[0], REDUCTIONS)
+    one_of(f"the reduction of metrics[{name!r}]", parts[0], REDUCTIONS)
     if len(parts) == 2:
         return Metric(parts[0], parts[1])
     try:

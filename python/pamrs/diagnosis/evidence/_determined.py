@@ -32,8 +32,8 @@ def with_stated_std(problem: Problem, group: BlockGroup, candidate: Candidate) -
 
 def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     """A group in which a name alone, whose values are not told from none (a wrong value: from one
-    inside its tolerances) by the standard deviations that are stated, has half of its probability,
-    and none where no more than noise was left.
+    inside its tolerances) by the standard deviations that are stated, has half of its probability;
+    a wrong value has none where no more than noise was left.
 
     The rest falls to ``unlisted``: something acts there, and which effect was not told (to nothing,
     where no more than noise was left). Whether a set needs such a name is told by the evidence of
@@ -53,7 +53,7 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     """
     settings = problem.settings
     found = dict(group.probabilities)
-    lost = 1.0 if group.mismatch is None else 0.5
+    quiet = _without_name(group) == UNDECIDED
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
         if len(candidate.terms) != 1 or chance < settings.in_set:
@@ -61,6 +61,7 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
         stated = with_stated_std(problem, group, candidate)
         inside = may_be_inside(stated, settings.most_tolerances, _DETERMINED_STDS)
         if inside or undetermined_effects(stated):
+            lost = 1.0 if candidate.wrong and quiet else 0.5
             found[candidate.hypothesis] -= lost * chance
             to = _without_name(group)
             found[to] = found.get(to, 0.0) + lost * chance

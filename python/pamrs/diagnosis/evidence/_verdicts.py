@@ -109,7 +109,7 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
     found = {h: p for h, p in group.probabilities.items() if h != UNDECIDED}
     unchanged = group.probabilities.get(UNDECIDED, 0.0)
     shifted = bool(group.instead) or any(significant(e) for e in group.nominal.values())
-    explained = any(c.wrong for c in group.candidates)
+    explained = any(c.wrong and found.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates)
     quiet = {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
     if parameters_at_wall(group) and group.mismatch is None and not explained:
         quiet = {PARAMETERS: _STRAINED_PARAMETERS, UNLISTED: _STRAINED_UNLISTED}

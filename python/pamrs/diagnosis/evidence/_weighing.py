@@ -136,8 +136,9 @@ def weigh(
     tolerances are off), and so does `UNLISTED`: physics without a name leaves as large a share of
     the mismatch as a right name does. The right name may have been fitted badly, or in a form that
     the catalogue lacks: then it leaves as much, and names share that chance as they weigh beside
-    each other, each as far as it takes the mismatch with values that its physics has, a set at the
-    price of its further names. A set with an effect whose size is not told from none names nothing.
+    each other, each as far as it takes the mismatch with values that its physics has. That a set
+    was missed is less probable than that a single name was, by the price of its further names. A
+    set with an effect whose size is not told from none names nothing.
 
     Parameters
     ----------

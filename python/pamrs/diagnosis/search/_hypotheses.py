@@ -458,8 +458,9 @@ def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
         return None
     work = _begun(least, tell)
     # a few steps show whether the error is smaller beside an effect, which is then fitted anew
-    ranked = by_effect(work.search.screened.scores())
-    best = [_scaled_starts(best_of_each_kind(scores)) for scores in ranked.values()]
+    screened = work.search.screened
+    worth = [s for s in by_effect(screened.scores()).values() if _is_worth(screened, s)]
+    best = [_scaled_starts(best_of_each_kind(scores)) for scores in worth]
     baseline = work.search.start.fit
     tried = two_at_a_time(
         lambda start: least.trial.fit_shortly([start], baseline),
@@ -890,9 +891,8 @@ def _fit_singles(search: Search) -> list[Candidate]:
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
-    # signatures of strong effects rule none out
     least = max(LEAST_GAIN, _LEAST_GAIN_SHARE * most)
-    worth = _by_family([e for e, gain in gains.items() if screened.strong or gain > least])
+    worth = _by_family([e for e, scores in ranked.items() if _is_worth(screened, scores, least)])
     first = ", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8])
     search.tell(Line(f"screened: {first or 'no effect acts here'}", _SCREENED))
 
@@ -939,6 +939,11 @@ def _fit_effect(
     return min(both, key=lambda c: c.misfit, default=None)
 
 
+def _is_worth(screened: Screen, scores: list[Score], least: float = LEAST_GAIN) -> bool:
+    """Whether an effect is fitted: signatures of strong effects rule none out."""
+    return screened.strong or scores[0].gain > least
+
+
 def _scaled_starts(scores: Iterable[Score]) -> list[Start]:
     """Where fits begin: starts in the size in which they take most."""
     return [s.start.scaled(s.size) for s in scores]
@@ -950,9 +955,10 @@ def _shortlist(
     """Of many effects (each a list of its places) those that leave least after a few steps, where
     the best of these steps led, and what they came to, by effect and form.
 
-    Signatures rank the starts of a form and rule no effect out: they are linear in what a strong
-    effect is not. Each form of each effect gets a few steps from its best start, and the effects
-    that then lead from all their others.
+    Signatures rank places and starts and rule no effect out: they are linear in what a strong
+    effect is not. Each form of each effect gets a few steps from its best start at its best place;
+    effects that came to nothing in every form are left, and those that then lead get a few steps
+    from all their other starts.
     """
     trial, weight, baseline = search.trial, search.weight, search.start.fit
     settings = trial.settings
@@ -971,7 +977,6 @@ def _shortlist(
 
     best_of = {places[0]: best_of_each_kind(ranked[places[0]]) for places in worth}
     begin({effect: _scaled_starts(best) for effect, best in best_of.items()})
-    # an effect that came to nothing from the best start of each form has nothing to explain here
     walls = settings.most_tolerances
     absent = {e for e, own in short.items() if own and all(is_absent(c, walls) for c in own)}
     there = [places for places in worth if places[0] not in absent]

@@ -276,7 +276,6 @@ def _times(time: Any, about: Mapping[str, Any]) -> Array | None:
 
 
 def _seconds(time: Array, about: Mapping[str, Any]) -> Array:
-
     known = understood_unit(_text(about.get("units")) or "s")
     if known is None or not same_dimension(known.unit, "s"):
         raise RecordingError(f"the unit {_text(about.get('units'))!r} of a time is not known")
