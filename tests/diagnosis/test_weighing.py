@@ -20,7 +20,7 @@ from pamrs.diagnosis.fit import Events, Fit, Problem, Start, fits
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.diagnosis.screen import Score
-from pamrs.diagnosis.search._hypotheses import _shortlist
+from pamrs.diagnosis.search import _hypotheses
 from pamrs.effects import EFFECTS, NONE, UNLISTED, Hypothesis, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
@@ -281,8 +281,34 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
         ]
         for term in terms(*keys)
     }
-    found, _, _ = _shortlist(search, [[term] for term in ranked], ranked)
+    found, _, _ = _hypotheses._shortlist(search, [[term] for term in ranked], ranked)
     assert [term.id for term in found] == ["muscle_rate_damping"]
     assert sorted(asked) == sorted(
         [(effect, 1.0) for effect in keys] + [("muscle_rate_damping", 2.0)]
     )
+
+
+@pytest.mark.parametrize(
+    ("strong", "tried"), [(False, ["muscle_creep"]), (True, [*CREEP, *DAMPING])]
+)
+def test_inside_the_error_of_the_model_effects_get_a_few_steps(
+    monkeypatch: pytest.MonkeyPatch, tried: list[str], *, strong: bool
+) -> None:
+    """Beside wrong values, those that a signature speaks for; of a strong mismatch all of them."""
+    scores = [
+        Score(term, Start(term, {"size": 1.0}, {}, (), False), gain, 1.0, np.zeros(0))
+        for term, gain in zip(terms(*CREEP, *DAMPING), (100.0, 1.0), strict=True)
+    ]
+    screened = SimpleNamespace(strong=strong, scores=lambda: scores)
+    search = SimpleNamespace(screened=screened, start=SimpleNamespace(fit=None))
+    begun = SimpleNamespace(search=search, own=[], transient=[], mistaken=["wrong"])
+    monkeypatch.setattr(_hypotheses, "_begun", lambda refit, tell: begun)
+    shortly = SimpleNamespace(fit_shortly=lambda starts, _: starts[0].effect.id)
+    refit = SimpleNamespace(
+        error=({}, {"arm": 1.0}),
+        error_is_given=False,
+        start="start",
+        beside=lambda sizes: SimpleNamespace(trial=shortly),
+        beside_less=lambda candidates: candidates,
+    )
+    assert _hypotheses._hidden(refit, print) == ["start", *tried, "wrong"]

@@ -113,7 +113,7 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
     assert chamber["held_out"]["refit"]["noises"] > 3.0 * chamber["held_out"]["after"]["noises"]
     kept = found.unexplained[0]
     assert (kept["block"], kept["unit"], kept["verdict"]) == ("arm", "rad", "unlisted")
-    assert 1e-3 < kept["size"] < 1e-2
+    assert 1e-2 < kept["size"] < 2.5e-2  # of an encoder that is off by 20 mrad
     assert found.headline.index("dead zone") < found.headline.index("in the arm")
     assert "the residual of the arm" in found.summary().replace("\n", " ").replace("  ", " ")
 
@@ -148,7 +148,8 @@ def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
 
 
 @pytest.mark.slow
-def test_a_dead_time_of_the_command_and_a_late_clock_stay_a_set() -> None:
+def test_a_dead_time_of_the_command_leads_a_late_clock() -> None:
+    """A clock without a drift would leave the same recordings, and is rarer."""
     rig = pamrs.rigs.shoulder()
 
     def late(name: str, role: str, seed: int) -> Recording:
@@ -174,12 +175,11 @@ def test_a_dead_time_of_the_command_and_a_late_clock_stay_a_set() -> None:
         pamrs.Case("late", rig, [late(f"r{k}", role, k) for k, role in enumerate(roles)], Path())
     )
     assert found.verdict == "effects"
-    assert sorted(found.ambiguity[:2]) == [["clock_skew"], ["input_path_lag"]]
+    assert found.probabilities["input_path_lag"] > found.probabilities["clock_skew"] > 0.0
     told = {e["id"]: (e["form"], e["parameters"]) for e in found.effects}
     form, parameters = told["input_path_lag"]
     assert form == "dead_time"
     assert parameters["delay"]["value"] == pytest.approx(0.025, abs=5e-4)
-    assert "with the logger of the pressures" in found.next_experiment["text"]
 
 
 @pytest.mark.slow
