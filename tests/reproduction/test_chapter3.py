@@ -68,7 +68,7 @@ def test_a_fact_needs_a_source_and_a_criterion():
     with pytest.raises(ParameterError, match="where is empty: the fact 'fact'"):
         judge("group", "fact", " ", 1.0, 1.0)
     with pytest.raises(
-        ParameterError, match="relation = 'near' is not allowed: one of equals, above, below"
+        ParameterError, match="relation = 'near' is not allowed: one of 'equals', 'above', 'below'"
     ):
         judge("group", "fact", "3.2", 1.0, 1.0, relation="near")
     with pytest.raises(ParameterError, match="basis = 'luck' is not allowed"):
