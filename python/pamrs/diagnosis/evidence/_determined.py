@@ -53,7 +53,7 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     """
     settings = problem.settings
     found = dict(group.probabilities)
-    quiet = _without_name(group) == UNDECIDED
+    to = _without_name(group)
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
         if len(candidate.terms) != 1 or chance < settings.in_set:
@@ -61,9 +61,8 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
         stated = with_stated_std(problem, group, candidate)
         inside = may_be_inside(stated, settings.most_tolerances, _DETERMINED_STDS)
         if inside or undetermined_effects(stated):
-            lost = 1.0 if candidate.wrong and quiet else 0.5
+            lost = 1.0 if candidate.wrong and to == UNDECIDED else 0.5
             found[candidate.hypothesis] -= lost * chance
-            to = _without_name(group)
             found[to] = found.get(to, 0.0) + lost * chance
     return replace(group, probabilities=found)
 

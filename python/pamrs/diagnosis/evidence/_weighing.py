@@ -232,7 +232,7 @@ def _evidence(
     total = 0.0
     for name in (block.name for block in suspects):
         own, before = candidate.likelihood()[name], baseline.likelihood()[name]
-        taken = max(0.0, before.size**2 - own.size**2) if own.size < math.inf else 0.0
+        taken = max(0.0, before.size**2 - own.size**2)
         expected = _LEAST_ERROR + _FORM_ERROR * math.sqrt(taken)
         beyond = np.log(np.maximum(own.sizes, expected) / expected) / _FORM_SPREAD
         # windows that are too short for a hypothesis leave it fewer bins

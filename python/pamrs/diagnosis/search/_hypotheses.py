@@ -459,13 +459,14 @@ def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
     work = _begun(least, tell)
     # a few steps show whether the error is smaller beside an effect, which is then fitted anew
     screened = work.search.screened
-    worth = [s for s in by_effect(screened.scores()).values() if _is_worth(screened, s)]
-    best = [_scaled_starts(best_of_each_kind(scores)) for scores in worth]
+    starts = [
+        start
+        for scores in by_effect(screened.scores()).values()
+        if _is_worth(screened, scores)
+        for start in _scaled_starts(best_of_each_kind(scores))
+    ]
     baseline = work.search.start.fit
-    tried = two_at_a_time(
-        lambda start: least.trial.fit_shortly([start], baseline),
-        [start for starts in best for start in starts],
-    )
+    tried = two_at_a_time(lambda start: least.trial.fit_shortly([start], baseline), starts)
     events = _fit_events(work.search, [*work.own, *work.transient])
     singles = [*(c for c in tried if c is not None), *events, *work.mistaken]
     return refit.beside_less([refit.start, *singles])
