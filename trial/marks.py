@@ -88,7 +88,7 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class _Truth:
+class Truth:
     """What a key conceals: ids of families by block, parameters far off, unlisted by block; places
     by id. A block of a side of a pair has its name, as `chamber.flexor`.
     """
@@ -157,7 +157,8 @@ def _number(value: Any) -> float | None:
     return float(value) if good else None
 
 
-def _truth(key: dict[str, Any]) -> _Truth:
+def opened(key: dict[str, Any]) -> Truth:
+    """What a key conceals."""
     listed = tuple(
         (str(e["id"]), block)
         for e in key["effects"]
@@ -169,7 +170,7 @@ def _truth(key: dict[str, Any]) -> _Truth:
         for t in key["terms"]
         if t["kind"] == "model_error"
     }
-    return _Truth(
+    return Truth(
         listed,
         tuple(
             block
@@ -220,7 +221,7 @@ def _parts(name: str) -> set[str]:
 
 
 def _claim(
-    probabilities: dict[str, Any], truth: _Truth, where: set[str]
+    probabilities: dict[str, Any], truth: Truth, where: set[str]
 ) -> tuple[float, bool] | None:
     """Largest stated probability of a group of blocks and whether it is on the truth there."""
     pooled: dict[frozenset[str], float] = {}
@@ -295,7 +296,7 @@ def _shares(key: dict[str, Any], result: dict[str, Any]) -> tuple[bool, ...]:
     return tuple(found)
 
 
-def _blocks(truth: _Truth, told: _Told) -> tuple[BlockMark, ...]:
+def _blocks(truth: Truth, told: _Told) -> tuple[BlockMark, ...]:
     """Marks of the groups of blocks that a result judges by themselves."""
     found = []
     for group in told.groups:
@@ -373,7 +374,7 @@ def _tags(key: dict[str, Any]) -> dict[str, tuple[str, ...]]:
     }
 
 
-def _seen(key: dict[str, Any], truth: _Truth) -> tuple[bool, bool]:
+def _seen(key: dict[str, Any], truth: Truth) -> tuple[bool, bool]:
     """Whether enough of every effect and wrong parameter is left, and no less than model error."""
     terms = [t for t in key["terms"] if t["kind"] != "model_error"]
     sizes = [max(t["left"].values(), default=0.0) for t in terms]
@@ -401,7 +402,7 @@ def _with_places(told: _Told) -> list[str]:
     return [f"{name} at {at[name]}" if at.get(name) else name for name in told.named]
 
 
-def _placed(truth: _Truth, told: _Told) -> bool | None:
+def _placed(truth: Truth, told: _Told) -> bool | None:
     """Whether the first name is at its place, where that name is right and has one: at both sides
     are an effect without a place and two of them.
     """
@@ -413,7 +414,7 @@ def _placed(truth: _Truth, told: _Told) -> bool | None:
     return said in ({""}, set(SIDES)) if right == BOTH else said == {right}
 
 
-def _located(truth: _Truth, result: dict[str, Any]) -> bool:
+def _located(truth: Truth, result: dict[str, Any]) -> bool:
     """Whether the block that is said first is one in which something is missing or wrong."""
     said = (result.get("where") or {}).get("block")
     wrong = {b for _, b in truth.listed} | {*truth.unlisted, *truth.wrong_block.values()}
@@ -439,7 +440,7 @@ def gap_of(result: dict[str, Any]) -> float | None:
 
 def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
     """Mark one case; a missing result is wrong wherever a question arises."""
-    truth = _truth(key)
+    truth = opened(key)
     seen, above = _seen(key, truth)
     tags = _tags(key)
     blank = {"verdict": "none", "seconds": None}
