@@ -261,24 +261,6 @@ def test_a_value_that_nobody_has_published_costs_odds() -> None:
         assert least < odds["base_flexibility"] / odds["payload_swing"] < most
 
 
-def test_what_acts_over_most_of_the_motion_is_no_end_stop() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
-    start, rival = named((), 3.0, {}), named(terms("muscle_creep"), 1.0, {})
-    odds = []
-    for angle in (1.2, 0.35):
-        rig = RIG.with_effect("joint_end_stop", {"angle": angle})
-        stop = named(terms("joint_end_stop"), 1.0, {})
-        stop = replace(stop, fit=replace(stop.fit, rig=rig))
-        found = weighed(
-            [start, rival, stop],
-            blocks,
-            Weighing(0.985, 30.0, SETTINGS, {"joint_angle": (0.3, 1.4)}),
-        )
-        odds.append(found["joint_end_stop"] / found["muscle_creep"])
-    assert odds[0] == pytest.approx(1.0)
-    assert odds[1] < 0.1
-
-
 def test_what_relaxes_at_once_is_another_stiffness() -> None:
     """A time constant below its own standard deviation was not seen: the wrong value wins."""
     blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]

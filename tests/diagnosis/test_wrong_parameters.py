@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import jsonschema
 import numpy as np
@@ -11,11 +13,13 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Attempts, Candidate
 from pamrs.diagnosis.fit import Problem, fit
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
 from pamrs.diagnosis.search import suspects_at_wall
+from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, _needless
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
@@ -226,3 +230,16 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
     # two pairs at the most, the one parameter with a predicted gain beyond a file that is wrong by
     # chance, and not the other
     assert asked == [*pairs[:2], ("muscle.modulus_scale",)]
+
+
+def test_a_parameter_beside_another_has_to_take_a_share_of_its_own() -> None:
+    def left(misfit: float) -> Candidate:
+        return cast("Candidate", SimpleNamespace(misfit=misfit))
+
+    trial = cast("Attempts", SimpleNamespace(settings=SETTINGS))
+    share = FURTHER_SHARE
+    short = {("a",): left(100.0), ("b",): left(300.0), ("a", "b"): left(101.0 * (1.0 - share))}
+    assert _needless(("a", "b"), short, trial)
+    assert not _needless(("a", "b"), short | {("a", "b"): left(99.0 * (1.0 - share))}, trial)
+    assert not _needless(("a",), short, trial)
+    assert not _needless(("b", "c"), short | {("b", "c"): left(100.0)}, trial)

@@ -230,14 +230,6 @@ class DiagnosisSettings:
         "hypotheses that are fitted to their end",
         "docs/decisions/0022: two to four seconds each",
     )
-    least_gain_below_noise: float = _setting(
-        45.0,
-        "chi-square",
-        "gain, autocorrelation counted, from which a signature counts in "
-        "residuals that are no larger than noise; healthy gas blocks have none above 8, arms none "
-        "above 19",
-        "docs/decisions/0020, 14 and 5 healthy cases of seed 11",
-    )
     file_log_odds: float = _setting(
         4.6,
         "log odds",

@@ -4,10 +4,10 @@ Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_
 `autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
 `BlockLikelihood` (how probable recordings are);
 `weigh`, `explains`, `is_absent`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
-`capped_probability`, `penalty`, `price`, `possible_gain`, `lacks_drift`, `loss_by_values`,
-`visited_ranges`, `Weighing` (their weights); `drop_undetermined`, `undetermined_effects`,
-`with_stated_std`, `put_aside` (names that do not hold); `Judged`, `judge`, `case_verdict`,
-`case_probabilities`, `case_ambiguity`, `parameters_at_wall` (verdicts).
+`price`, `possible_gain`, `loss_by_values`,
+`Weighing` (their weights); `drop_undetermined`, `with_stated_std`, `put_aside`
+(names that do not hold); `Judged`, `judge`, `case_verdict`, `case_probabilities`,
+`case_ambiguity`, `parameters_at_wall` (verdicts).
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from pamrs.diagnosis.evidence._candidates import (
 from pamrs.diagnosis.evidence._determined import (
     drop_undetermined,
     put_aside,
-    undetermined_effects,
     with_stated_std,
 )
 from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
@@ -41,28 +40,22 @@ from pamrs.diagnosis.evidence._verdicts import (
 )
 from pamrs.diagnosis.evidence._weighing import (
     FORM_SHARE_ALIKE,
-    STANDING_PRICE,
     Weighing,
-    capped_probability,
     explains,
     is_absent,
-    lacks_drift,
     log_weight,
     loss_by_values,
-    penalty,
     possible_gain,
     price,
     probability_cap,
     same_recordings,
     share_left,
-    visited_ranges,
     weigh,
 )
 
 __all__ = [
     "WALL_TOLERANCES",
     "FORM_SHARE_ALIKE",
-    "STANDING_PRICE",
     "Attempts",
     "BlockLikelihood",
     "Candidate",
@@ -70,7 +63,6 @@ __all__ = [
     "Judged",
     "Weighing",
     "autocorrelation_of",
-    "capped_probability",
     "case_ambiguity",
     "case_probabilities",
     "case_verdict",
@@ -81,7 +73,6 @@ __all__ = [
     "judge",
     "log_weight",
     "parts_of",
-    "penalty",
     "price",
     "put_aside",
     "probability_cap",
@@ -90,12 +81,9 @@ __all__ = [
     "share_left",
     "significant",
     "with_stated_std",
-    "lacks_drift",
     "start_of",
     "parameters_at_wall",
-    "undetermined_effects",
     "loss_by_values",
-    "visited_ranges",
     "weigh",
     "without_autocorrelation",
 ]

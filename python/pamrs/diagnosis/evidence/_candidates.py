@@ -101,8 +101,6 @@ class Candidate:
         less probable before any data.
     likelihood : callable
         How probable what it leaves of all recordings is, by block.
-    forms_tried : bool
-        Whether its effects were tried in other forms beside each other.
     """
 
     effects: tuple[Term, ...]
@@ -115,7 +113,6 @@ class Candidate:
     wrong: tuple[str, ...] = ()
     places: float = 0.0
     likelihood: Callable[[], Mapping[str, BlockLikelihood]] = field(default=dict, repr=False)
-    forms_tried: bool = False
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -191,12 +188,6 @@ class BlockGroup:
         than the baseline.
     sought : bool
         Whether one was looked for.
-    below_noise : bool
-        Whether no block keeps an excess, and an effect was found by its signature, or by a
-        parameter that it lets go back: ``mismatch`` (and the only suspect) is then the block in
-        which it acts.
-    instead : tuple of str
-        Parameters that would have to be far from their nominal values instead of it.
     inclusion : dict of Term to float
         Share of resampled recordings in which the screen would have taken each persistent effect.
     predicted_gain : dict of Term to float
@@ -213,8 +204,6 @@ class BlockGroup:
     suspects: list[Block]
     closure: Candidate | None = None
     sought: bool = False
-    below_noise: bool = False
-    instead: tuple[str, ...] = ()
     inclusion: dict[Term, float] = field(default_factory=dict)
     predicted_gain: dict[Term, float] = field(default_factory=dict)
 
@@ -614,26 +603,6 @@ class Attempts:
             return None
         return found
 
-    def fit_without(self, larger: Candidate, needless: Term) -> Candidate | None:
-        """A set of persistent effects and wrong parameters without one of its terms, fitted to its
-        end from where the whole set stands; None where that cannot be run.
-        """
-        starts = [self.start_of(larger.fit, e) for e in larger.effects if e != needless]
-        wrong = tuple(name for name in larger.wrong if Term(name) != needless)
-        return self._fit_to_the_end(starts, larger.fit, wrong)
-
-    def _fit_to_the_end(
-        self, starts: list[Start], warm: Fit, wrong: tuple[str, ...]
-    ) -> Candidate | None:
-        """Effects fitted to the end from a fit, with some parameters freed; None where that cannot
-        be run.
-        """
-        names = (*(start.effect for start in starts), *wrong)
-        return self._attempt(
-            names,
-            lambda: self._continue(starts, warm, wrong, _POLISH_EVALUATIONS, FINAL_STEP_SHARE),
-        )
-
     def _continue(
         self,
         starts: list[Start],
@@ -688,10 +657,11 @@ class Attempts:
         found = candidate.fit
         if found.events is not None or not candidate.effects:
             return candidate
-        polished = self._fit_to_the_end(self.starts_of(candidate), found, candidate.wrong)
-        if polished is None:
-            return candidate
-        return replace(polished, gain=candidate.gain, forms_tried=candidate.forms_tried)
+        starts, end = self.starts_of(candidate), (_POLISH_EVALUATIONS, FINAL_STEP_SHARE)
+        polished = self._attempt(
+            candidate.terms, lambda: self._continue(starts, found, candidate.wrong, *end)
+        )
+        return candidate if polished is None else replace(polished, gain=candidate.gain)
 
 
 def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:

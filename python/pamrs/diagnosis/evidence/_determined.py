@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate
-from pamrs.diagnosis.evidence._weighing import may_be_inside
-from pamrs.diagnosis.fit import Problem, form_in, spread_over_pieces
-from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
+from pamrs.diagnosis.evidence._weighing import (
+    fitted_sizes,
+    is_near_none,
+    may_be_inside,
+)
+from pamrs.diagnosis.fit import Problem, spread_over_pieces
+from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis
 
 # stated deviations within which a size, or that a value is wrong, is not determined; a stated one
 # is twice the pieces'
@@ -60,45 +63,39 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
             continue
         stated = with_stated_std(problem, group, candidate)
         inside = may_be_inside(stated, settings.most_tolerances, _DETERMINED_STDS)
-        if inside or undetermined_effects(stated):
+        if inside or _has_undetermined_effect(stated):
             lost = 1.0 if candidate.wrong and to == UNDECIDED else 0.5
             found[candidate.hypothesis] -= lost * chance
             found[to] = found.get(to, 0.0) + lost * chance
     return replace(group, probabilities=found)
 
 
-def undetermined_effects(candidate: Candidate) -> list[Term]:
-    """Effects of a set whose sizes, all together, are not told from none by its standard
+def _has_undetermined_effect(candidate: Candidate) -> bool:
+    """Whether a set has an effect whose sizes, all together, are not told from none by its standard
     deviations: with their shapes as uncertain as they are.
 
     What happened at times of its own in single recordings is told by when it happened.
     """
     found = candidate.fit
     happened = None if found.events is None else found.events.effect
-    names, sealed = list(found.scales), found.rig.model["valve"] is None
-    out = []
+    names = list(found.values)
     for effect in (e for e in candidate.effects if e != happened):
-        form = effect.info.form(form_in(found.rig, effect))
-        sizes = [
-            f"{effect}.{p.name}"
-            for p in form.parameters
-            if p.role_in(sealed=sealed) == "size" and p.neutral == 0.0
-        ]
-        at = [names.index(name) for name in sizes if name in names]
-        if not at:
+        sizes = fitted_sizes(found, effect)
+        if not sizes:
             continue
-        own = np.array([found.values[names[k]] for k in at])
-        std = np.array([found.std[names[k]] for k in at])
+        at = [names.index(name) for name in sizes]
+        own, std = np.array([(found.values[n], found.std[n]) for n in sizes]).T
         spread = found.covariance[np.ix_(at, at)]
         narrow = np.sqrt(np.diag(spread))
         if not (np.isfinite(std).all() and (narrow > 0.0).all()):
-            out += [effect] * (not np.isfinite(std).any())
+            if not np.isfinite(std).any():
+                return True
             continue
         spread = spread * np.outer(std / narrow, std / narrow)
         distance = own @ np.linalg.pinv(spread, hermitian=True) @ own
-        if chi2.sf(distance, len(at)) > chi2.sf(_DETERMINED_STDS**2, 1):
-            out.append(effect)
-    return out
+        if is_near_none(distance, len(sizes), _DETERMINED_STDS):
+            return True
+    return False
 
 
 def put_aside(group: BlockGroup, hypothesis: Hypothesis) -> BlockGroup:
@@ -117,5 +114,5 @@ def put_aside(group: BlockGroup, hypothesis: Hypothesis) -> BlockGroup:
 
 
 def _without_name(group: BlockGroup) -> Hypothesis:
-    """What is left of a name that does not hold: a signature below the noise is nothing then."""
-    return UNDECIDED if group.below_noise or group.mismatch is None else UNLISTED
+    """What is left where a name does not hold."""
+    return UNDECIDED if group.mismatch is None else UNLISTED

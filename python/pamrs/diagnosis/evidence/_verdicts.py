@@ -108,7 +108,7 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
     """
     found = {h: p for h, p in group.probabilities.items() if h != UNDECIDED}
     unchanged = group.probabilities.get(UNDECIDED, 0.0)
-    shifted = bool(group.instead) or any(significant(e) for e in group.nominal.values())
+    shifted = any(significant(e) for e in group.nominal.values())
     explained = any(c.wrong and found.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates)
     quiet = {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
     if parameters_at_wall(group) and group.mismatch is None and not explained:
@@ -184,9 +184,7 @@ def _odds_shared(
     if len(holders) < 2 or not _same_values(term, [c for _, c in holders]):
         return 1.0
     prices = [
-        price_of_term(c, term, settings)
-        for group, c in holders
-        if group.mismatch is not None and not group.below_noise
+        price_of_term(c, term, settings) for group, c in holders if group.mismatch is not None
     ]
     again = sum(prices) - max(prices, default=0.0)
     return _SHARED_ODDS ** (len(holders) - 1) * math.exp(again)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
-from pamrs.channels import channel_of
 from pamrs.diagnosis.evidence._candidates import Candidate, significant
-from pamrs.diagnosis.fit import Problem, form_in, same_data_in
+from pamrs.diagnosis.fit import Fit, Problem, form_in, same_data_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
-    EFFECTS,
     UNDECIDED,
     UNLISTED,
     Hypothesis,
@@ -31,7 +28,7 @@ from pamrs.effects import (
 # variance that is left, since what no model explains depends on itself (decision 14)
 _LEAST_SHARE, _MOST_SHARE, _NOISE_SHARE = 0.01, 0.1, 0.3
 # share of what it explains that a right name leaves, as forms of equations err (decision 14)
-_FORM_ERROR = 0.2
+_FORM_ERROR = 0.1
 _FORM_SPREAD = math.log(3.0)  # spread of the logarithm of that share: a factor (decision 14)
 # [noise levels] error that is left beside whatever is explained: noise levels err (decision 14)
 _LEAST_ERROR = 0.1
@@ -48,7 +45,7 @@ _CLEAR_SHARE = 0.7
 # share of a mismatch by which forms that leave as much differ (decision 20)
 FORM_SHARE_ALIKE = 0.01
 # log odds: an effect like another, as a parameter is near zero; 7 to 1 (decision 20)
-STANDING_PRICE = 2.0
+_STANDING_PRICE = 2.0
 _SAME_SHARE = 0.1  # part of an effect's size below which what tells it from another effect is zero
 # [standard deviations] standard deviations within which a value is not told from zero
 _SAME_STDS = 2.0
@@ -56,20 +53,10 @@ _SAME_STDS = 2.0
 _UNSEEN_LENGTHS = 3.0
 # [log odds] price of an effect with such a time constant, or with one that is not told from zero
 _UNSEEN_PRICE = 6.5
-# relative scatter of an effect's size between recordings beyond which it is not that effect
-_SCATTER = 0.35
-_SCATTER_WIDTH = 0.1  # further scatter that costs one unit of log odds
 # factor by which a value is one standard deviation outside its usual range (decision 22)
 _RANGE_FACTOR = 3.0
 # [log odds] the most that a value outside its usual range costs (decision 22)
 _MOST_RANGE_PRICE = 4.0
-# share of the range that was visited over which a contact may act (decision 22)
-_CONTACT_SHARE = 0.5
-_CONTACT_WIDTH = 0.15  # share beyond that which costs a standard deviation (decision 22)
-
-
-VisitedRanges = dict[str, tuple[float, float]]
-"""What was visited, by kind of channel [SI]."""
 
 
 @dataclass(frozen=True)
@@ -84,29 +71,11 @@ class Weighing:
         Length of the longest recording that was fitted [s].
     settings : DiagnosisSettings
         Prices.
-    ranges : dict, optional
-        What was visited in these recordings, by kind of channel [SI].
     """
 
     most: float
     seconds: float
     settings: DiagnosisSettings
-    ranges: VisitedRanges = field(default_factory=dict)
-
-
-def visited_ranges(problem: Problem) -> VisitedRanges:
-    """Range of each kind of channel that is the output of one block alone: the angle of a rig's
-    only joint.
-    """
-    channels: dict[str, list[str]] = {}
-    for block in problem.blocks:
-        channels.setdefault(channel_of(block.channel), []).append(block.channel)
-    found = {}
-    for kind, names in channels.items():
-        if len(names) == 1:
-            values = [p.signals[names[0]][0] for p in problem.recordings]
-            found[kind] = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
-    return found
 
 
 def probability_cap(fitted: Problem, mismatch: Block, left: float, *, alone: bool) -> float:
@@ -212,8 +181,8 @@ def log_weight(
 
 def _rarity(candidate: Candidate, weighing: Weighing) -> float:
     """What a hypothesis loses by values that its physics hardly has."""
-    lost = loss_by_values(candidate, weighing.ranges)
-    lost += STANDING_PRICE * lacks_drift(candidate, weighing.seconds)
+    lost = loss_by_values(candidate)
+    lost += _STANDING_PRICE * _lacks_drift(candidate, weighing.seconds)
     return lost + _UNSEEN_PRICE * _has_unseen_time(candidate, weighing.seconds)
 
 
@@ -314,22 +283,35 @@ def is_absent(candidate: Candidate, walls: float) -> bool:
         return True
     if found.events is not None:
         return False
-    names, sealed = list(found.values), found.rig.model["valve"] is None
+    names = list(found.values)
     for effect in candidate.effects:
-        form = effect.info.form(form_in(found.rig, effect))
-        own = [p for p in form.parameters if f"{effect}.{p.name}" in found.values]
-        sizes = [p.role_in(sealed=sealed) == "size" and p.neutral == 0.0 for p in own]
-        if not any(sizes):
+        own = [name for name in names if effect_of(name) == effect]
+        sizes = np.isin(own, fitted_sizes(found, effect))
+        if not sizes.any():
             continue
-        at = [names.index(f"{effect}.{p.name}") for p in own]
-        values = np.array([found.values[names[k]] / found.scales[names[k]] for k in at])[sizes]
+        at = [names.index(name) for name in own]
+        values = np.array([found.values[n] / found.scales[n] for n in own])[sizes]
         spread = found.covariance[np.ix_(at, at)]
         certain = np.any((values != 0.0) & (np.diag(spread)[sizes] == 0.0))
         distance = values @ np.linalg.pinv(spread, hermitian=True)[np.ix_(sizes, sizes)] @ values
-        # of a single size: whether it is within so many standard deviations of none
-        if not certain and chi2.sf(distance, sum(sizes)) >= chi2.sf(_SAME_STDS**2, 1):
+        if not certain and is_near_none(distance, values.size, _SAME_STDS):
             return True
     return False
+
+
+def fitted_sizes(found: Fit, effect: Term) -> list[str]:
+    """Parameters of an effect that were fitted and are zero where it is not there."""
+    sealed = found.rig.model["valve"] is None
+    form = effect.info.form(form_in(found.rig, effect))
+    sizes = (p for p in form.parameters if p.role_in(sealed=sealed) == "size" and p.neutral == 0.0)
+    return [name for p in sizes if (name := f"{effect}.{p.name}") in found.values]
+
+
+def is_near_none(distance: float, count: int, stds: float) -> bool:
+    """Whether so many sizes, at a squared distance from none, are as a single one within some
+    standard deviations of none.
+    """
+    return bool(chi2.sf(distance, count) >= chi2.sf(stds**2, 1))
 
 
 def may_be_inside(candidate: Candidate, walls: float, stds: float) -> bool:
@@ -365,19 +347,6 @@ def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
     )
 
 
-def capped_probability(odds: float, most: float) -> float:
-    """Probability of logarithmic odds, at most so much."""
-    return most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
-
-
-def penalty(candidate: Candidate, seconds: float) -> float:
-    """What a set's values take from the logarithm of its odds: a size that scatters between
-    recordings, a time that was not seen.
-    """
-    scatter = max(0.0, candidate.scattered() - _SCATTER) / _SCATTER_WIDTH
-    return scatter + _UNSEEN_PRICE * _has_unseen_time(candidate, seconds)
-
-
 def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
     """Whether a time constant of a set was not seen: it is much longer than the recordings, or
     not told from zero. What relaxes at once is another stiffness.
@@ -390,7 +359,7 @@ def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
     )
 
 
-def lacks_drift(candidate: Candidate, seconds: float) -> bool:
+def _lacks_drift(candidate: Candidate, seconds: float) -> bool:
     """Whether a clock of a set does not drift: two free clocks drift, and a constant delay is a lag
     or a dead time.
     """
@@ -404,18 +373,14 @@ def lacks_drift(candidate: Candidate, seconds: float) -> bool:
     return any(at_rest(e, same) for e in candidate.effects for same in e.info.same_data)
 
 
-def loss_by_values(candidate: Candidate, ranges: VisitedRanges) -> float:
+def loss_by_values(candidate: Candidate) -> float:
     """What a set loses by values that its physics hardly has.
 
     A parameter with a prior loses by its distance from it, as by a Cauchy distribution: a value of
-    ten deviations is rare, but it does not rule out what explains a mismatch to its noise. A
-    contact is met near an end of the motion, and what acts over most of the range is none; other
+    ten deviations is rare, but it does not rule out what explains a mismatch to its noise. Other
     parameters lose by how many times they are outside the range of usual values, for certain.
     """
-    lost = sum(_loss_by_value(candidate, name) for name in candidate.fit.effect_values)
-    for effect in (e for e in candidate.fit.rig.effects if Term.of(e) in candidate.effects):
-        lost += _contact_price(effect["id"], effect["parameters"], ranges)
-    return lost
+    return sum(_loss_by_value(candidate, name) for name in candidate.fit.effect_values)
 
 
 def _loss_by_value(candidate: Candidate, name: str) -> float:
@@ -436,40 +401,35 @@ def _loss_by_value(candidate: Candidate, name: str) -> float:
     return lost
 
 
-def _contact_price(effect: str, values: Mapping[str, float], ranges: VisitedRanges) -> float:
-    """What an effect loses by a contact that is met in the middle of the motion."""
-    lost = 0.0
-    for place in EFFECTS[effect].with_role("place"):
-        low, high = ranges.get(place.channel, (0.0, 0.0))
-        if high > low:
-            inside = (values[place.name] - low) / (high - low)
-            above = all(values[side.name] >= 0.0 for side in EFFECTS[effect].with_role("side"))
-            touched = 1.0 - inside if above else inside
-            beyond = max(0.0, touched - _CONTACT_SHARE) / _CONTACT_WIDTH
-            lost += min(0.5 * beyond**2, _MOST_RANGE_PRICE)
-    return lost
-
-
 def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
     """What a set pays for its names, for the parameters of its effects (of events of one kind every
     time and size), for the places where they could have been, and for a file that is wrong.
     """
-    own = settings.wrong_price * len(candidate.wrong) + candidate.outside(settings.most_tolerances)
-    own += settings.further_price * len(candidate.terms)
-    counted = sum(not find_parameter(n).repeats for n in candidate.fit.effect_values)
+    own = sum(_own_price(candidate, term, settings) for term in candidate.terms)
+    own += settings.further_price * len(candidate.terms) + candidate.places
     events = candidate.fit.events
-    counted += 0 if events is None else sum(len(v) for v in events.values.values())
-    return own + settings.parameter_price * counted + candidate.places
+    happened = 0 if events is None else sum(len(v) for v in events.values.values())
+    return own + settings.parameter_price * happened
 
 
-def price_of_term(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
-    """What a set loses by one of its terms before any data: by the parameters of an effect, their
-    values and its place, or by how far a parameter of the file is wrong.
+def _own_price(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
+    """What a set pays for the parameters of one of its effects, or for how far a parameter of the
+    file is wrong.
     """
     if term.id in candidate.wrong:
         return settings.wrong_price + candidate.outside_of(term.id, settings.most_tolerances)
-    own = [n for n in candidate.fit.effect_values if effect_of(n) == term]
-    counted = sum(not find_parameter(n).repeats for n in own)
-    rare = sum(_loss_by_value(candidate, n) for n in own)
-    places = candidate.places / max(1, len(candidate.effects))
-    return settings.parameter_price * counted + rare + places
+    own = (n for n in candidate.fit.effect_values if effect_of(n) == term)
+    return settings.parameter_price * sum(not find_parameter(n).repeats for n in own)
+
+
+def price_of_term(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
+    """What a set loses by one of its terms before any data: by what it pays for the term, its
+    values and its place.
+    """
+    own = _own_price(candidate, term, settings)
+    if term.id in candidate.wrong:
+        return own
+    rare = sum(
+        _loss_by_value(candidate, n) for n in candidate.fit.effect_values if effect_of(n) == term
+    )
+    return own + rare + candidate.places / max(1, len(candidate.effects))

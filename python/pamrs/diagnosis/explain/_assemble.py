@@ -251,7 +251,7 @@ def _considered(judged: list[Judged], fitted: Problem) -> list[Considered]:
         for own in judged:
             group, blocks = own.group, own.group.suspects
             terms = tuple(t for t in asked.terms if any(concerns(t, b) for b in blocks))
-            if group.mismatch is None or group.below_noise or not terms:
+            if group.mismatch is None or not terms:
                 continue
             acting = Hypothesis(terms)
             there = next((c for c in group.candidates if c.hypothesis == acting), None)
@@ -291,11 +291,10 @@ def _tested(groups: list[BlockGroup]) -> list[Tested]:
 
 def _located(judged: list[Judged]) -> str | None:
     """The block that the answer is about: that with the largest mismatch, of groups with a name or
-    without one; else one with a signature below the noise, else one at a wall.
+    without one; else one at a wall.
     """
     told = [j for j in judged if j.named or j.wrong or j.verdict == "unlisted"]
-    above = [j.group for j in told if not j.group.below_noise]
-    for groups in (above, [j.group for j in told], [j.group for j in judged]):
+    for groups in ([j.group for j in told], [j.group for j in judged]):
         found = [
             (g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name)
             for g in groups

@@ -70,25 +70,11 @@ def where(
     )
     group = next((g for g in groups if g.mismatch and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
-    below_noise = group is not None and group.below_noise
-    if wrong and (group is None or below_noise):
+    if wrong and group is None:
         text = (
             f"The {place}{parts} fits down to the noise level, but only with parameters at "
             "the ends of their tolerances. With another value of the "
             f"{' and the '.join(map(spoken_name, wrong))} they return to their nominal values."
-        )
-    elif group is not None and group.instead:
-        moved = ", ".join(
-            f"{n} by {group.candidates[0].fit.moved[n]:+.1f} tolerances" for n in group.instead
-        )
-        text = (
-            f"No block's residual is above the noise level, but the refit of the "
-            f"{place}{parts} had to move {moved}. An effect explains the same data without that."
-        )
-    elif below_noise:
-        text = (
-            f"No block's residual is above the noise level, but the residual of the "
-            f"{place}{parts} contains the signature of an effect, in held-out recordings too."
         )
     elif group is not None and group.probabilities.get(UNDECIDED, 0.0) > _NO_MISMATCH_PROBABILITY:
         text = (
@@ -101,21 +87,17 @@ def where(
             f"Every block fits down to the noise level, but the {place} only with a "
             "parameter far outside its tolerance (see the warnings)."
         )
-    telling = (
-        []
-        if below_noise
-        else [c for c in picture.conditions if c.share > TELLING_CONDITION * c.time][:2]
-    )
+    telling = [c for c in picture.conditions if c.share > TELLING_CONDITION * c.time][:2]
     if telling:
         text += " It is largest under: " + "; ".join(c.text for c in telling) + "."
-    if picture.intervals and not below_noise:
+    if picture.intervals:
         text += f" The intervals are those of recording {picture.recording}."
     return Where(
         block=located,
         channel=block.channel,
         probability=round(chance, 4),
-        intervals=[] if below_noise else picture.intervals,
-        conditions=[] if below_noise else picture.conditions[:6],
+        intervals=picture.intervals,
+        conditions=picture.conditions[:6],
         text=text,
         recording=picture.recording,
     )

@@ -1,15 +1,13 @@
-"""Hypotheses tried for a mismatch: effects alone and in pairs, wrong parameters, what is below the
-noise, forms without a name.
+"""Hypotheses tried for a mismatch: effects alone and in sets, wrong values, forms without a name.
 
 Public: `examine` (all of it, for some blocks), `refitted`, `with_autocorrelation` (the baseline
 alone), `find_misread`, `Reading`, `reading_errors` (other units of channels), `find_closure`,
-`find_below_noise`, `free_suspects`, `find_wrong_values`, `suspects_at_wall`.
+`free_suspects`, `find_wrong_values`, `suspects_at_wall`.
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.search._baseline import refitted, with_autocorrelation
-from pamrs.diagnosis.search._below_noise import find_below_noise
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._hypotheses import examine
 from pamrs.diagnosis.search._readings import Reading, find_misread, reading_errors
@@ -21,7 +19,6 @@ from pamrs.diagnosis.search._wrong_parameters import (
 
 __all__ = [
     "Reading",
-    "find_below_noise",
     "find_wrong_values",
     "examine",
     "find_closure",

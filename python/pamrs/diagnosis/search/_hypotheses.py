@@ -26,7 +26,6 @@ from pamrs.diagnosis.evidence import (
     same_recordings,
     share_left,
     significant,
-    visited_ranges,
     weigh,
     without_autocorrelation,
 )
@@ -66,7 +65,6 @@ from pamrs.diagnosis.screen import (
     screen,
 )
 from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
-from pamrs.diagnosis.search._below_noise import find_below_noise
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._considered import fit_considered
 from pamrs.diagnosis.search._sets import (
@@ -79,11 +77,9 @@ from pamrs.diagnosis.search._sets import (
     cannot_gain,
     combine,
     far_above_noise,
-    in_best_forms,
     log_misfit,
     settles,
     with_freed_values,
-    without_needless,
 )
 from pamrs.diagnosis.search._wrong_parameters import find_wrong_values, free_suspects
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -219,13 +215,17 @@ def _begin_part(
         if less is not None:
             return _tried(less, tell)
     if refit.apart and not any(significant(kept[b.name]) for b in refit.trial.suspects):
-        common = _fit_all_recordings(refit.trial, refit.start)
+        what = "the common fit of all recordings"
+        common = inner.losses.part(what, lambda: _fit_all_recordings(refit.trial, refit.start))
         if common is not None:
             tell("one baseline leaves noise in all recordings")
             return _healthy_group(refit, common)
     if refit.trial.suspects:
         return _explain(refit, tell)
-    return _search_in_noise(refit, say, tell)
+    quiet = refit.group([refit.start], {UNDECIDED: 1.0}, None)
+    trial = replace(refit.trial, suspects=blocks)
+    what = "the search for a value at the end of its range"
+    return inner.losses.part(what, lambda: find_wrong_values(trial, quiet, tell), quiet)
 
 
 @dataclass(frozen=True, eq=False)
@@ -405,33 +405,13 @@ def _healthy_group(refit: _Refit, common: Candidate) -> BlockGroup:
     return replace(refit.group([common], {UNDECIDED: 1.0}, None), nominal=ever, suspects=[])
 
 
-def _acting_effects(trial: Attempts, blocks: list[Block]) -> list[Term]:
-    """Effects of the catalogue that the rig can have, that it does not hold already and that act in
-    some blocks: everywhere, and at each place that the blocks tell apart.
+def _acting_effects(trial: Attempts) -> list[Term]:
+    """Effects of the catalogue that the rig can have, that it does not hold already and that act
+    where an excess is left: everywhere, and at each place that the blocks tell apart.
     """
     lacking = [e for e in CATALOGUE if e not in trial.held and fits(trial.nominal, e)]
     terms = [term for e in lacking for term in trial.terms_of(e)]
-    return [term for term in terms if any(acts_in(term, b) for b in blocks)]
-
-
-def _search_in_noise(refit: _Refit, say: Say, tell: Say) -> BlockGroup:
-    """A group that keeps only noise: an effect below it, or a parameter at the end of its plausible
-    range, may still show.
-    """
-    nothing = refit.group([refit.start], {UNDECIDED: 1.0}, None)
-    blocks = refit.trial.inner.blocks
-    # the rounding of a coarse converter does not average out as noise does
-    coarse = {name for p in refit.trial.inner.recordings for name in p.steps}
-    fine = [b for b in blocks if coarse.isdisjoint((b.channel, *b.drives))]
-    persistent = [e for e in _acting_effects(refit.trial, fine) if e.info.lasting]
-    trial = replace(refit.trial, suspects=blocks)
-    part = trial.inner.losses.part
-    below = part(
-        "the search below the noise", lambda: find_below_noise(trial, nothing, persistent, say)
-    )
-    quiet = below or nothing
-    what = "the search for a value at the end of its range"
-    return part(what, lambda: find_wrong_values(trial, quiet, tell), quiet)
+    return [term for term in terms if any(acts_in(term, b) for b in trial.suspects)]
 
 
 def _explain(refit: _Refit, tell: Say) -> _Mismatch:
@@ -439,11 +419,17 @@ def _explain(refit: _Refit, tell: Say) -> _Mismatch:
     the model to be better than was thought, which may show more.
     """
     found = _tried(refit, tell)
-    less = refit.beside_less(found.candidates)
-    if less is None:
-        return found
-    tell("the model is better than usual: judged again with a smaller error")
-    return _tried(less, tell)
+
+    def again() -> _Mismatch | None:
+        less = refit.beside_less(found.candidates)
+        if less is None:
+            return None
+        tell("the model is better than usual: judged again with a smaller error")
+        return _tried(less, tell)
+
+    return (
+        refit.trial.inner.losses.part("the second judgement, with a smaller error", again) or found
+    )
 
 
 def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
@@ -510,7 +496,7 @@ def _begun(refit: _Refit, tell: Say) -> _Begun:
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
     size = f"{now[mismatch.name].systematic:.2g} noise levels"
     tell(Line(f"after the refit the residual of {mismatch.name} is {size}", _REFITTED))
-    acting = _acting_effects(trial, suspects)
+    acting = _acting_effects(trial)
     # events of free times would always mend a noise level that was estimated too low
     happens = [e for e in acting if not e.at and e.info.transient and not e.info.own]
     transient = [] if _is_marginal(refit) else happens
@@ -531,7 +517,6 @@ def _begun(refit: _Refit, tell: Say) -> _Begun:
         probability_cap(trial.inner, mismatch, now[mismatch.name].rms, alone=trial.same and sealed),
         max(p.n * p.dt for p in trial.inner.recordings),
         trial.settings,
-        visited_ranges(trial.inner),
     )
     search = Search(trial, screened, start, weighing, tell)
     return _Begun(search, mismatch, mistaken, own, transient)
@@ -707,9 +692,7 @@ def _is_visible(candidate: Candidate, start: Start) -> bool:
 def _weigh_to_the_end(
     search: Search, candidates: list[Candidate]
 ) -> tuple[list[Candidate], dict[Hypothesis, float]]:
-    """Hypotheses with their probabilities, those that are close fitted to the end first, each
-    effect in its best form.
-    """
+    """Hypotheses with their probabilities, those that are close fitted to the end first."""
     start, trial, settings = candidates[0], search.trial, search.trial.settings
 
     def weights(sets: list[Candidate]) -> dict[Hypothesis, float]:
@@ -720,26 +703,10 @@ def _weigh_to_the_end(
     close = sorted(likely, key=lambda c: -_probability(found, c))[: settings.most_polished]
     if len(close) > 1 or (close and not explains(close[0], start, trial.compared)):
         search.tell("fitting to the end " + ", ".join(str(c.hypothesis) for c in close))
-
-        def best(candidate: Candidate) -> Candidate:
-            what = f"the search for the best form of {candidate.hypothesis}"
-            work = partial(in_best_forms, search, candidate)
-            return trial.polish(trial.inner.losses.part(what, work, candidate))
-
-        ended = [best(c) if c in close else c for c in candidates]
+        ended = [trial.polish(c) if c in close else c for c in candidates]
         # what came back inside its tolerances on the way to the end is not wrong
         candidates = [c for c in ended if c.is_wrong(settings.most_tolerances)]
         found = weights(candidates)
-        sets = [c for c in candidates if _probability(found, c) > _POLISH_FROM]
-        parts = trial.inner.losses.part(
-            "the search for terms that are not needed",
-            lambda: without_needless(search, candidates, sets),
-            [],
-        )
-        if parts:
-            kept = {c.hypothesis for c in parts}
-            candidates = [*(c for c in candidates if c.hypothesis not in kept), *parts]
-            found = weights(candidates)
     return candidates, found
 
 

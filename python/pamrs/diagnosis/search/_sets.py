@@ -418,7 +418,7 @@ def in_best_forms(search: Search, base: Candidate) -> Candidate:
     Candidate
         The set itself where it leaves noise, and where no other form leaves less.
     """
-    if base.forms_tried or len(base.terms) < 2 or base.fit.events is not None:
+    if len(base.terms) < 2 or base.fit.events is not None:
         return base
 
     def leaves_more() -> bool:
@@ -432,7 +432,7 @@ def in_best_forms(search: Search, base: Candidate) -> Candidate:
             if other is None:
                 break
             best = other
-    return replace(best, forms_tried=True)
+    return best
 
 
 def _in_another_form(
@@ -465,45 +465,6 @@ def _in_another_form(
     if found is None or log_misfit(found) > log_misfit(base) - FORM_SHARE_ALIKE:
         return None
     return replace(found, gain=base.gain)
-
-
-def without_needless(
-    search: Search, candidates: list[Candidate], sets: list[Candidate]
-) -> list[Candidate]:
-    """Sets with one term fewer that leave nearly as little, fitted from the larger set's values.
-
-    A fit of the smaller set from elsewhere may have ended in another local minimum, so that the
-    larger one seems to be needed.
-
-    Parameters
-    ----------
-    search : Search
-        What they are found with.
-    candidates : list of Candidate
-        Every hypothesis that was fitted.
-    sets : list of Candidate
-        Those whose terms are taken out, one at a time.
-
-    Returns
-    -------
-    list of Candidate
-        Those that leave less than the fits of the same terms before, at most one for each.
-    """
-    known: dict[Hypothesis, float] = {}
-    for c in candidates:
-        known[c.hypothesis] = min(c.misfit, known.get(c.hypothesis, math.inf))
-    found: dict[Hypothesis, Candidate] = {}
-    for larger in (c for c in sets if len(c.terms) > 1 and c.fit.events is None):
-        for needless in larger.terms:
-            rest = Hypothesis(tuple(t for t in larger.terms if t != needless))
-            if (1.0 - FURTHER_SHARE) * known.get(rest, math.inf) < larger.misfit:
-                continue
-            search.tell(f"trying {rest} from {larger.hypothesis}")
-            smaller = search.trial.fit_without(larger, needless)
-            if smaller is not None and smaller.misfit < known.get(rest, math.inf):
-                found[rest], known[rest] = smaller, smaller.misfit
-    walls = search.trial.settings.most_tolerances
-    return [c for c in found.values() if c.is_wrong(walls)]
 
 
 def _blocks_untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[Block]:

@@ -27,6 +27,7 @@ from pamrs.diagnosis.fit import (
     with_priors,
 )
 from pamrs.diagnosis.prepare import Block
+from pamrs.effects import UNDECIDED
 from pamrs.rig import Rig
 from pamrs.rig.schema import split_name
 
@@ -34,7 +35,6 @@ from pamrs.rig.schema import split_name
 _PREDICTED_GAIN_EVALUATIONS = 50
 # share of what a set leaves that a further effect takes; less is the form of the others
 FURTHER_SHARE = 0.2
-_EFFECT_LOG_ODDS = 6.0  # [log odds] against an effect below the noise beside it (decision 25)
 # [chi-square] linear gain that frees a parameter: twice file_log_odds (decision 25)
 _LEAST_PREDICTED_GAIN = 9.2
 # freed parameters, and pairs of them, that are fitted to their end (decision 25)
@@ -278,8 +278,7 @@ def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], N
     the file is wrong about.
 
     Each parameter at its wall is freed. What speaks for it is what misfit and priors lose together,
-    weighed against the odds of a file that is so wrong, beside effects below the noise that the
-    group found, by what they lose.
+    weighed against the odds of a file that is so wrong.
     """
     start = quiet.candidates[0]
     found = free_suspects(trial, start.fit, start.fit, say, share=0.0)
@@ -292,15 +291,9 @@ def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], N
         return quiet
     autocorrelation = trial.autocorrelation(start.fit)
     before = with_priors(trial.inner, start.fit, autocorrelation)
-    effects = [
-        c
-        for c in quiet.candidates
-        if c.effects and quiet.probabilities.get(c.hypothesis, 0.0) > 0.0
-    ]
     # a file that is further outside its tolerances is rarer, but less and less so
     settings, walls = trial.settings, trial.settings.most_tolerances
     against = {c: settings.file_log_odds * len(c.wrong) + c.outside(walls) for c in shown}
-    against |= dict.fromkeys(effects, _EFFECT_LOG_ODDS)
     scores = {
         c: 0.5 * (before - with_priors(trial.inner, c.fit, autocorrelation)) - odds
         for c, odds in against.items()
@@ -310,7 +303,7 @@ def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], N
     total = math.exp(-top) + sum(weights.values())
     share = {c.hypothesis: weights[c] / total for c in shown}
     kept = 1.0 - sum(share.values())
-    probabilities = {h: p * kept for h, p in quiet.probabilities.items()} | share
+    probabilities = {UNDECIDED: kept} | share
     return replace(quiet, candidates=[*quiet.candidates, *shown], probabilities=probabilities)
 
 
