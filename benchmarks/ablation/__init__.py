@@ -2,5 +2,5 @@
 
 Prices and priors of the weighing are left out of what was weighed, which is kept of each case,
 without new fits; parts of the search by diagnosing anew the cases in which a part found something.
-A part that brings less than its standard error has to go (docs/decisions/0014).
+What was kept and what went by such tables is in docs/decisions/0014.
 """

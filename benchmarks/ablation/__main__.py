@@ -11,6 +11,7 @@ import os
 import sys
 from pathlib import Path
 
+from benchmarks.ablation.kept import keep_cases
 from benchmarks.ablation.without import PARTS, parts_table, weights_table
 from pamrs.diagnosis.prove import cases_of
 from pamrs.errors import PamrsError
@@ -23,7 +24,11 @@ def main(words: list[str] | None = None) -> int:
         prog="python -m benchmarks.ablation", description=(__doc__ or "").splitlines()[0]
     )
     parser.add_argument("folders", type=Path, nargs="+", help="trials: cases/ and keys/ of each")
-    parser.add_argument("--first", type=int, help="only the first so many cases of each, by name")
+    parser.add_argument(
+        "--first",
+        type=int,
+        help="diagnose so many cases of each (tables: all kept)",
+    )
     parser.add_argument(
         "--part", nargs="*", default=PARTS, help="parts of the search (default all; none: prices)"
     )
@@ -32,7 +37,6 @@ def main(words: list[str] | None = None) -> int:
     args = parser.parse_args(words)
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         os.environ[name] = "1"  # before the processes start; they inherit it
-    from benchmarks.ablation.kept import keep_cases
 
     def told(line: str) -> None:
         print(line, file=sys.stderr, flush=True)

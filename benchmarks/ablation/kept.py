@@ -2,9 +2,10 @@
 without parts of it and without new fits.
 
 Of each case the folder gets the result (``case_0001.json``), the parts of the search that found
-something (``case_0001.parts.json``), and every set of hypotheses that was weighed, without
-residuals (``case_0001.pickle``). The diagnosis has no hooks for this: its functions are replaced by
-ones that keep what they are given.
+something or tried to (``case_0001.parts.json``), and the hypotheses of each group of blocks,
+without residuals (``case_0001.pickle``). The diagnosis has no hooks for this: its functions are
+replaced by ones that keep what they are given. All that is kept of a trial has to come from one
+state of the code.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ from unittest.mock import patch
 
 from pamrs._losses import Losses
 from pamrs.diagnosis import diagnose
-from pamrs.diagnosis.evidence import Candidate, Weighing, weigh
+from pamrs.diagnosis.evidence import BlockGroup, Candidate, Weighing
 from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.search import Mismatch
 from pamrs.errors import PamrsError
 from pamrs.recordings import load_case
 from trial.concealed import write
@@ -57,20 +59,22 @@ def _light(candidate: Candidate) -> Candidate:
 
 
 @contextmanager
-def _recorded(without: str) -> Iterator[tuple[dict[tuple[str, ...], Weighed], set[str]]]:
-    """What a diagnosis weighs last of each group of blocks, and the parts of it that found
-    something; the parts whose name begins as `without` are left out.
+def _recorded(without: str) -> Iterator[tuple[list[Weighed], set[str]]]:
+    """What a diagnosis weighs of each group of blocks that is judged, and the parts of it that
+    found something; the parts whose name begins as `without` are left out.
     """
-    weighed: dict[tuple[str, ...], Weighed] = {}
+    weighed: list[Weighed] = []
     found_by: set[str] = set()
-    part = Losses.part
+    part, divided = Losses.part, Mismatch.groups
 
-    def keep(
-        candidates: list[Candidate], suspects: list[Block], weighing: Weighing
-    ) -> dict[Any, float]:
-        light = [_light(c) for c in candidates]
-        weighed[tuple(b.name for b in suspects)] = Weighed(light, suspects, weighing)
-        return weigh(candidates, suspects, weighing)
+    def keep(self: Any, say: Callable[[str], None]) -> list[BlockGroup]:
+        groups = divided(self, say)
+        for group in groups:
+            # of an undivided mismatch more blocks may be compared than have an excess
+            compared = self.search.trial.compared if len(groups) == 1 else group.suspects
+            light = [_light(c) for c in group.candidates]
+            weighed.append(Weighed(light, compared, self.search.weighing))
+        return groups
 
     def tried(
         self: Losses, what: str, work: Callable[[], Any], instead: Any = None, **how: Any
@@ -82,10 +86,7 @@ def _recorded(without: str) -> Iterator[tuple[dict[tuple[str, ...], Weighed], se
             found_by.add(what)
         return found
 
-    with (
-        patch("pamrs.diagnosis.search._hypotheses.weigh", keep),
-        patch.object(Losses, "part", tried),
-    ):
+    with patch.object(Mismatch, "groups", keep), patch.object(Losses, "part", tried):
         yield weighed, found_by
 
 
@@ -101,15 +102,16 @@ def keep_case(case: Path, out: Path, without: str = "") -> None:
     without : str
         How the name of a part of the search begins that is left out; nothing by default.
     """
+    out.mkdir(parents=True, exist_ok=True)
+    at = out / case.name
     with _recorded(without) as (weighed, found_by):
         try:
             result = diagnose(load_case(case)).to_json()
         except PamrsError as error:
-            result = json.dumps({"schema": "", "verdict": "failed", "error": str(error)})
-    out.mkdir(parents=True, exist_ok=True)
-    at = out / case.name
+            write(at.with_suffix(".failed"), f"{error}\n")
+            return
     part = at.with_suffix(".part")
-    part.write_bytes(pickle.dumps(list(weighed.values())))
+    part.write_bytes(pickle.dumps(weighed))
     part.replace(at.with_suffix(".pickle"))
     write(at.with_suffix(".parts.json"), json.dumps(sorted(found_by)) + "\n")
     write(at.with_suffix(".json"), result)  # last: with it the case is complete
@@ -138,7 +140,10 @@ def keep_cases(
     progress : callable, optional
         Called with a line after each case.
     """
-    missing = [case for case in cases if not (out / f"{case.name}.json").exists()]
+    done_before = (".json", ".failed")
+    missing = [
+        case for case in cases if not any((out / f"{case.name}{s}").exists() for s in done_before)
+    ]
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         begun = {pool.submit(keep_case, case, out, without): case for case in missing}
         for done in as_completed(begun):

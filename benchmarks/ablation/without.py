@@ -20,7 +20,7 @@ _WEIGHING = "pamrs.diagnosis.evidence._weighing"
 
 #: what is left out of the weighing: names of its module, and what stands in their place
 WEIGHTS: dict[str, dict[str, Any]] = {
-    "more of the evidence counts near the noise": {"_counted": lambda *_: 0.01},
+    "more of the evidence counts near the noise": {"_counted": lambda *_: 0.02},
     "forms of equations err": {"_FORM_ERROR": 0.0},
     "noise levels err": {"_LEAST_ERROR": 1e-6},
     "a right name may be missed": {"_MISSED_ODDS": 0.0},
@@ -94,7 +94,7 @@ def answer(
     named = sum(sets.values())
     lead = max(singles, key=lambda name: singles[name], default="")
     says = bool(lead) and singles[lead] > max(unnamed, 1.0 - named - unnamed)
-    if odd:
+    if odd and not there:
         return Answer(None, None, unnamed > named, math.log(max(unnamed, _FLOOR)))
     if there:
         exact = sets.get(frozenset(there), 0.0)

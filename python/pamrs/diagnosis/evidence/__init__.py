@@ -4,8 +4,7 @@ Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_
 `autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
 `BlockLikelihood` (how probable recordings are);
 `weigh`, `explains`, `is_absent`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
-`price`, `possible_gain`, `loss_by_values`,
-`Weighing` (their weights); `drop_undetermined`, `with_stated_std`, `put_aside`
+`possible_gain`, `Weighing` (their weights); `drop_undetermined`, `with_stated_std`, `put_aside`
 (names that do not hold); `Judged`, `judge`, `case_verdict`, `case_probabilities`,
 `case_ambiguity`, `parameters_at_wall` (verdicts).
 """
@@ -44,9 +43,7 @@ from pamrs.diagnosis.evidence._weighing import (
     explains,
     is_absent,
     log_weight,
-    loss_by_values,
     possible_gain,
-    price,
     probability_cap,
     same_recordings,
     share_left,
@@ -73,7 +70,6 @@ __all__ = [
     "judge",
     "log_weight",
     "parts_of",
-    "price",
     "put_aside",
     "probability_cap",
     "possible_gain",
@@ -83,7 +79,6 @@ __all__ = [
     "with_stated_std",
     "start_of",
     "parameters_at_wall",
-    "loss_by_values",
     "weigh",
     "without_autocorrelation",
 ]

@@ -414,17 +414,10 @@ class Attempts:
         return [Term(effect, at) for at in ("", *places)]
 
     def fit_effects(
-        self,
-        starts: list[Start],
-        warm: Fit,
-        autocorrelation: dict[str, float],
-        share: float | None = None,
+        self, starts: list[Start], warm: Fit, autocorrelation: dict[str, float]
     ) -> Candidate | None:
         """A set of effects fitted from one start of each, residuals weighted by their own
         autocorrelation; None where it cannot be run.
-
-        ``share`` is another share of the sum of squares than that of the settings below which a
-        step is not worth it.
         """
         effects = tuple(start.effect for start in starts)
         if not self.held.isdisjoint(e.id for e in effects):
@@ -433,11 +426,11 @@ class Attempts:
         limit = _SEALED_EVALUATIONS if sealed else settings.effect_evaluations
 
         def found() -> Candidate:
-            best = self._fit(starts, autocorrelation, warm, evaluations=limit, share=share)
+            best = self._fit(starts, autocorrelation, warm, evaluations=limit)
             weights = self.autocorrelation(best)
             if max(weights.values()) > CORRELATED_VARIANCE:
                 again = [self.start_of(best, effect) for effect in effects]
-                best = self._fit(again, weights, best, evaluations=limit, share=share)
+                best = self._fit(again, weights, best, evaluations=limit)
             return self.judge(effects, best)
 
         return self._attempt(effects, found)
@@ -551,7 +544,8 @@ class Attempts:
 
         It begins where these go alone; and, where that leaves more than noise, at the values that
         the baseline was moved to.
-        ``share`` is as in :meth:`fit_effects`.
+        ``share`` is another share of the sum of squares than the usual one below which a step is
+        not worth it.
         """
         settings = self.settings
         least = FINAL_STEP_SHARE if share is None else share

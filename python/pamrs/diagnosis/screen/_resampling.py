@@ -43,8 +43,7 @@ def inclusion_shares(
     least : float
         Gain in chi-square from which an effect is taken.
     partner : float
-        Share of the resample's sum of squares from which a second one is taken beside the first (1
-        or more: none).
+        Share of the resample's sum of squares from which a second one is taken beside the first.
     settings : DiagnosisSettings
         Number and length of the resampled segments, width of the bins, seed.
 

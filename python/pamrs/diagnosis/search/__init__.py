@@ -1,15 +1,15 @@
 """Hypotheses tried for a mismatch: effects alone and in sets, wrong values, forms without a name.
 
-Public: `examine` (all of it, for some blocks), `refitted`, `with_autocorrelation` (the baseline
-alone), `find_misread`, `Reading`, `reading_errors` (other units of channels), `find_closure`,
-`free_suspects`, `find_wrong_values`, `suspects_at_wall`.
+Public: `examine` (all of it, for some blocks), `Mismatch`, `refitted`, `with_autocorrelation` (the
+baseline alone), `find_misread`, `Reading`, `reading_errors` (other units of channels),
+`find_closure`, `free_suspects`, `find_wrong_values`, `suspects_at_wall`.
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.search._baseline import refitted, with_autocorrelation
 from pamrs.diagnosis.search._closure import find_closure
-from pamrs.diagnosis.search._hypotheses import examine
+from pamrs.diagnosis.search._hypotheses import Mismatch, examine
 from pamrs.diagnosis.search._readings import Reading, find_misread, reading_errors
 from pamrs.diagnosis.search._wrong_parameters import (
     find_wrong_values,
@@ -18,6 +18,7 @@ from pamrs.diagnosis.search._wrong_parameters import (
 )
 
 __all__ = [
+    "Mismatch",
     "Reading",
     "find_wrong_values",
     "examine",

@@ -157,18 +157,18 @@ def examine(
         names = " and ".join(b.name for b in blocks)
         say(Line(f"{names}: judged", 1.0, part=names))
 
-    def begin(blocks: list[Block]) -> _Mismatch | BlockGroup | None:
+    def begin(blocks: list[Block]) -> Mismatch | BlockGroup | None:
         what = f"the judgement of {' and '.join(b.name for b in blocks)}"
         work = partial(_begin_part, fitted, held, nominal, blocks, say)
         found = losses.part(what, work, through=through)
-        if not isinstance(found, _Mismatch):
+        if not isinstance(found, Mismatch):
             judged(blocks)
         return found
 
-    def end(part: _Mismatch | BlockGroup | None) -> list[BlockGroup]:
+    def end(part: Mismatch | BlockGroup | None) -> list[BlockGroup]:
         if part is None or isinstance(part, BlockGroup):
             return [part] if part else []
-        others = [p for p in begun if isinstance(p, _Mismatch) and p is not part]
+        others = [p for p in begun if isinstance(p, Mismatch) and p is not part]
         starts = [start for p in others for start in p.leading]
         names = " and ".join(b.name for b in part.refit.trial.inner.blocks)
         beside = losses.part(
@@ -195,7 +195,7 @@ def examine(
 
 def _begin_part(
     fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say
-) -> _Mismatch | BlockGroup:
+) -> Mismatch | BlockGroup:
     """Some blocks examined by themselves: a mismatch with its hypotheses, or, where they keep only
     noise, the group that they are.
     """
@@ -414,18 +414,21 @@ def _acting_effects(trial: Attempts) -> list[Term]:
     return [term for term in terms if any(acts_in(term, b) for b in trial.suspects)]
 
 
-def _explain(refit: _Refit, tell: Say) -> _Mismatch:
+def _explain(refit: _Refit, tell: Say) -> Mismatch:
     """A mismatch with every hypothesis that was tried for it; tried again where the best one shows
     the model to be better than was thought, which may show more.
     """
     found = _tried(refit, tell)
 
-    def again() -> _Mismatch | None:
+    def again() -> Mismatch | None:
         less = refit.beside_less(found.candidates)
         if less is None:
             return None
         tell("the model is better than usual: judged again with a smaller error")
-        return _tried(less, tell)
+        try:
+            return _tried(less, tell)
+        except SimulationError:
+            return None
 
     return (
         refit.trial.inner.losses.part("the second judgement, with a smaller error", again) or found
@@ -481,12 +484,12 @@ class _Begun:
     transient: list[Term]
 
 
-def _tried(refit: _Refit, tell: Say) -> _Mismatch:
+def _tried(refit: _Refit, tell: Say) -> Mismatch:
     """A mismatch with every hypothesis that was tried for it, beside one size of error."""
     work = _begun(refit, tell)
     candidates = _fit_hypotheses(work.search, work.mistaken, work.own, work.transient)
     candidates, weighed = _weigh_to_the_end(work.search, candidates)
-    return _Mismatch(refit, work.mismatch, work.search, candidates, weighed)
+    return Mismatch(refit, work.mismatch, work.search, candidates, weighed)
 
 
 def _begun(refit: _Refit, tell: Say) -> _Begun:
@@ -523,7 +526,7 @@ def _begun(refit: _Refit, tell: Say) -> _Begun:
 
 
 @dataclass(frozen=True, eq=False)
-class _Mismatch:
+class Mismatch:
     """What some blocks keep after the refit, with the hypotheses that were tried for it.
 
     Attributes
@@ -558,7 +561,7 @@ class _Mismatch:
         lasting = best.fit.events is None
         return trial.starts_of(best) if lasting else []
 
-    def with_effects_of_others(self, starts: list[Start]) -> _Mismatch:
+    def with_effects_of_others(self, starts: list[Start]) -> Mismatch:
         """The same with what other blocks name tried here, where it acts: alone, and beside what
         leads here.
         """
