@@ -35,7 +35,6 @@ WEIGHTS: dict[str, dict[str, Any]] = {
 #: parts of the search that are left out, by how their names begin
 PARTS = (
     "the search for effects inside the error of the model",
-    "the second judgement, with a smaller error",
     "the common fit of all recordings",
     "the search for a value at the end of its range",
     "the search for wrong values",

@@ -221,7 +221,7 @@ def _begin_part(
             tell("one baseline leaves noise in all recordings")
             return _healthy_group(refit, common)
     if refit.trial.suspects:
-        return _explain(refit, tell)
+        return _tried(refit, tell)
     quiet = refit.group([refit.start], {UNDECIDED: 1.0}, None)
     trial = replace(refit.trial, suspects=blocks)
     what = "the search for a value at the end of its range"
@@ -412,27 +412,6 @@ def _acting_effects(trial: Attempts) -> list[Term]:
     lacking = [e for e in CATALOGUE if e not in trial.held and fits(trial.nominal, e)]
     terms = [term for e in lacking for term in trial.terms_of(e)]
     return [term for term in terms if any(acts_in(term, b) for b in trial.suspects)]
-
-
-def _explain(refit: _Refit, tell: Say) -> Mismatch:
-    """A mismatch with every hypothesis that was tried for it; tried again where the best one shows
-    the model to be better than was thought, which may show more.
-    """
-    found = _tried(refit, tell)
-
-    def again() -> Mismatch | None:
-        less = refit.beside_less(found.candidates)
-        if less is None:
-            return None
-        tell("the model is better than usual: judged again with a smaller error")
-        try:
-            return _tried(less, tell)
-        except SimulationError:
-            return None
-
-    return (
-        refit.trial.inner.losses.part("the second judgement, with a smaller error", again) or found
-    )
 
 
 def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
