@@ -272,8 +272,6 @@ class _Refit:
         where that is hardly smaller.
         """
         trial, (usual, sizes) = self.trial, self.error
-        if self.error_is_given:
-            return None
         each = [(c, *error_sizes(trial.inner, c.fit.residuals, usual)) for c in candidates]
         _, left, _ = max(each, key=lambda one: one[2] - _price(one[0], trial))
         if all(left[name] > _CLEARLY_LESS * size for name, size in sizes.items()):
