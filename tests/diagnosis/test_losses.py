@@ -84,7 +84,7 @@ def test_a_hypothesis_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -
 
 
 FAILING = {
-    _hypotheses: ("free_suspects", "inclusion_shares", "with_freed_values", "fit_considered"),
+    _hypotheses: ("free_suspects", "with_freed_values", "fit_considered"),
     _conclude: ("budget", "free_run"),
     pamrs.diagnosis: ("next_to_record",),
     _assemble: ("describe",),

@@ -69,8 +69,7 @@ class Diagnosis(View, Findings):
         it acts, where it is one of several), ``probability``, ``name`` (in words), ``parameters``
         {name: {value, std, unit, interval?, identifiable?}}, most probable first; SI, 95 %
         intervals; ``events``, what happened in single recordings (``recording``, ``time`` and the
-        effect's other parameters, SI), and ``inclusion``, the share of resampled recordings in
-        which the screen would have taken the effect.
+        effect's other parameters, SI).
     ambiguity : list of list of str
         Sets of names (effects, wrong parameters by dotted name, ``unlisted``, ``parameters``) that
         the data cannot separate; empty when settled. Here and in ``probabilities``, ``blocks``,

@@ -349,7 +349,7 @@ class DiagnosisSettings:
     seed: int = _setting(
         20140501,
         "1",
-        "seed of every random draw (noise levels, dither, resamples), so that a diagnosis repeats",
+        "seed of every random draw (noise levels, dither), so that a diagnosis repeats",
         "arbitrary: any other one is as good",
     )
 

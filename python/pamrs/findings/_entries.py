@@ -124,8 +124,6 @@ class EffectFound(Entry):
         Which form of its equation predicts best, where it has several; empty for the usual one.
     probability : float
         Of the effect, whatever its form and whatever else acts.
-    inclusion : float or None
-        Share of resampled recordings in which the screen would have taken it.
     parameters : dict of str to EffectParameterFound
         By name.
     events : list of dict
@@ -148,14 +146,6 @@ class EffectFound(Entry):
         metadata=told("form of the effect's equation, where it is not the usual", omit_empty=True),
     )
     probability: float = field(default=math.nan, metadata=told(kind="probability"))
-    inclusion: float | None = field(
-        default=None,
-        metadata=told(
-            "share of resampled recordings in which the screen would have taken the effect",
-            kind="probability",
-            omit_empty=True,
-        ),
-    )
     parameters: dict[str, EffectParameterFound] = field(default_factory=dict)
     events: list[dict[str, Any]] = field(
         default_factory=list,

@@ -188,8 +188,6 @@ class BlockGroup:
         than the baseline.
     sought : bool
         Whether one was looked for.
-    inclusion : dict of Term to float
-        Share of resampled recordings in which the screen would have taken each persistent effect.
     predicted_gain : dict of Term to float
         Share of the mismatch that each tested effect could take by its signature alone.
     """
@@ -204,7 +202,6 @@ class BlockGroup:
     suspects: list[Block]
     closure: Candidate | None = None
     sought: bool = False
-    inclusion: dict[Term, float] = field(default_factory=dict)
     predicted_gain: dict[Term, float] = field(default_factory=dict)
 
     @property

@@ -347,10 +347,6 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
             at=effect.at,
             form=form_in(candidate.fit.rig, effect),
             probability=p,
-            inclusion=max(
-                (j.group.inclusion[effect] for j in judged if effect in j.group.inclusion),
-                default=None,
-            ),
             parameters=_effect_parameters(effect, candidate),
             events=_events(effect, candidate),
         )

@@ -1,14 +1,12 @@
-"""Which effects are worth a fit, and how sure that is: scores, resamples of the recordings, one
-recording left out after the other.
+"""Which effects are worth a fit: scores, and one recording left out after the other.
 
 Public: `Score`, `Screen`, `Tangent`, `screen`, `tangent_of`, `by_effect`, `best_of_each_kind`,
-`best_size`, `inclusion_shares`, `predicted_by_others`.
+`best_size`, `predicted_by_others`.
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.screen._leave_one_out import predicted_by_others
-from pamrs.diagnosis.screen._resampling import inclusion_shares
 from pamrs.diagnosis.screen._screening import (
     STRONG_SIZES,
     Score,
@@ -29,7 +27,6 @@ __all__ = [
     "best_of_each_kind",
     "best_size",
     "by_effect",
-    "inclusion_shares",
     "predicted_by_others",
     "screen",
     "tangent_of",

@@ -60,7 +60,6 @@ from pamrs.diagnosis.screen import (
     Screen,
     best_of_each_kind,
     by_effect,
-    inclusion_shares,
     predicted_by_others,
     screen,
 )
@@ -72,7 +71,6 @@ from pamrs.diagnosis.search._sets import (
     MOST_PAIRED,
     MOST_STARTS,
     NEAR_PLACE,
-    PARTNER_SHARE,
     Search,
     cannot_gain,
     combine,
@@ -569,13 +567,8 @@ class Mismatch:
         refit, weighed = self.refit, self.weighed
         now = refit.start.fitted[self.block.name]
         part = refit.trial.inner.losses.part
-        shares: dict[Term, float] = {}
-        resampled = partial(
-            inclusion_shares, self.search.screened, LEAST_GAIN, PARTNER_SHARE, refit.trial.settings
-        )
         group = replace(
             refit.group(self.candidates, weighed, self.block),
-            inclusion=part("the screen of resampled recordings", resampled, shares),
             predicted_gain=_predicted_gain(self.search.screened, now, _MARGINAL_EXCESS),
         )
         if _leading(weighed) == UNLISTED:

@@ -45,7 +45,7 @@ MOST_PAIRED = 2  # single effects that get a partner (decision 13)
 _MOST_PARTNERS = 2  # partners that each of these gets (decision 13)
 # [standard errors] held-out improvement, over pieces, that keeps a further effect
 _FURTHER_ERRORS = 2.0
-PARTNER_SHARE = 0.01  # least predicted gain of a partner, as a share of the mismatch (decision 13)
+_PARTNER_SHARE = 0.01  # least predicted gain of a partner, as a share of the mismatch (decision 13)
 # share left alone for a fit with the best effects: it takes a fifth (decision 103)
 _TELLING_LEFT = 0.8
 # share left by the best persistent effect that asks for transient ones (decision 20)
@@ -319,7 +319,7 @@ class _Growing:
         tangent, ranked = self.search.rank(base)
         alone = len(base.terms) == 1
         # what a term leaves is a mismatch of its own, however large what it takes is
-        least = max(LEAST_GAIN, PARTNER_SHARE * tangent.power_left)
+        least = max(LEAST_GAIN, _PARTNER_SHARE * tangent.power_left)
         likely = [e for e, scores in ranked.items() if scores[0].gain > least]
         best = _one_place_each(likely)[:_MOST_PARTNERS]
         # what is left in one block may be little beside what another one had: an effect of that
@@ -389,7 +389,7 @@ def _event_partners(
             key: replace(r, jacobian=kept[key].jacobian) for key, r in single.fit.residuals.items()
         }
         beside = replace(start.fit, residuals=left, moved=single.fit.moved)
-        least = max(LEAST_GAIN, PARTNER_SHARE * mismatch)
+        least = max(LEAST_GAIN, _PARTNER_SHARE * mismatch)
         told = [
             s
             for s in screened.scores(tangent_of(beside, trial.inner, trial.white))
