@@ -31,7 +31,8 @@ from pamrs.control.stability import (
 )
 from pamrs.control.trajectories import step
 from pamrs.errors import ParameterError
-from tests.control.helpers import CONDUCTANCE, SmallPid, with_regulator
+from tests.control.helpers import CONDUCTANCE, SmallPid, with_regulator, without_friction
+from tests.simulation.refusals import refused
 
 PERIOD = 0.005
 ELBOW = math.radians(45.0)
@@ -42,16 +43,8 @@ def even_valves(name, angle, **options):
     """A packaged rig without dry friction whose valves have, at the pressures that hold it, the
     same slope where they fill as where they vent: a small motion then has one linear model.
     """
-    rig = pamrs.rigs.named(name)
-    model = rig.model
-    for table in model["muscle"].values():
-        table |= dict.fromkeys(
-            ("friction_coefficient", "friction_pressure_slope", "friction_floor"), 0.0
-        )
-    for table in [model["arm"]] if model["link"] is None else model["link"].values():
-        table["coulomb"] = 0.0
-    smooth = pamrs.Rig(rig.name, model)
-    start = RigController(RigModel(smooth), law_of(RigModel(smooth)), **options).holding(angle)
+    smooth = without_friction(name)
+    start = controller_of(smooth, options).holding(angle)
     gas, model = smooth.model["gas"], smooth.model
     ambient = gas["ambient_pressure"]
     supply = smooth.tables("supply")[""]["initial_pressure"] + ambient
@@ -63,7 +56,7 @@ def even_valves(name, angle, **options):
         ratio = chamber["alpha_in"] * supply / (chamber["alpha_out"] * pressure)
         table |= {"flow": "iso_6358", "fill_critical_ratio": 0.85, "vent_critical_ratio": 0.85}
         table |= {"fill_conductance": CONDUCTANCE, "vent_conductance": CONDUCTANCE * ratio}
-    return pamrs.Rig(rig.name, model)
+    return pamrs.Rig(name, model)
 
 
 def law_of(model, **changes):
@@ -73,8 +66,8 @@ def law_of(model, **changes):
     )
 
 
-def controller_of(rig, options):
-    return RigController(RigModel(rig), law_of(RigModel(rig)), **options)
+def controller_of(rig, options, **changes):
+    return RigController(RigModel(rig), law_of(RigModel(rig), **changes), **options)
 
 
 CASES = {
@@ -257,22 +250,16 @@ def test_a_regulator_in_front_of_a_valve_is_held(name):
 def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
     rig = even_valves("antagonistic_joint", ELBOW, stiffness=18.0)
 
+    options = {"stiffness": 18.0}
+
     def hold(loaded):
-        return controller_of(loaded, {"stiffness": 18.0}).holding(ELBOW)
+        return controller_of(loaded, options).holding(ELBOW)
 
     def made(switching):
-        return RigController(
-            RigModel(rig), law_of(RigModel(rig), switching=switching), stiffness=18.0
-        )
+        return controller_of(rig, options, switching=switching)
 
-    region = stable_region(
-        rig,
-        made,
-        {"switching": [4e3, 4e6]},
-        payloads=[rig.model["arm"]["payload"]],
-        hold=hold,
-        delay=0.005,
-    )
+    payloads, axes = [rig.model["arm"]["payload"]], {"switching": [4e3, 4e6]}
+    region = stable_region(rig, made, axes, payloads=payloads, hold=hold, delay=0.005)
     model = linearise(rig, initial=hold(rig), side="fill")
     alone = spectral_radius(model, linear_controller(made(4e6), model.point), delay=0.005)
     assert region.radius[0, 1] >= alone > 1.0
@@ -281,16 +268,9 @@ def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
 
 def recruited(rig, share=Recruitment):
     known = RigModel(rig)
-    return RigController(
-        known,
-        known.law("sliding", period=PERIOD),
-        shares=share(
-            known.torques_of("shoulder"),
-            known.pressure_limit,
-            period=PERIOD,
-            reach=math.radians(60.0),
-        ),
-    )
+    groups, options = known.torques_of("shoulder"), {"period": PERIOD, "reach": math.radians(60.0)}
+    shares = share(groups, known.pressure_limit, **options)
+    return RigController(known, known.law("sliding", period=PERIOD), shares=shares)
 
 
 @pytest.mark.parametrize("degrees", range(20, 120, 12))
@@ -383,23 +363,23 @@ def test_commands_are_taken_by_their_names():
 
 def test_what_cannot_be_is_named(held):
     rig, controller, start, model, linear, angle = held
-    with pytest.raises(ParameterError, match="margins_of_each"):
-        margins(model, linear)
-    with pytest.raises(ParameterError, match="command = 'valve_command.other'"):
-        margins(model, linear, command="valve_command.other")
-    with pytest.raises(ParameterError, match="one without a name"):
-        loop_matrix(model, linear_controller(PID(1.0), {"joint_angle": 0.5}))
-    with pytest.raises(ParameterError, match="angle is missing"):
-        linearise(rig)
-    with pytest.raises(ParameterError, match="does not rest"):
-        linearise(rig, initial={**start, controller.tracked[0]: start[controller.tracked[0]] + 0.1})
-    with pytest.raises(ParameterError, match=r"point has no joint_angle\."):
-        linear_controller(controller, {"joint_angle": 0.5})
-    with pytest.raises(ParameterError, match=r"angle = .* one number each is needed, joint_angle"):
-        controller.holding(np.zeros(len(controller.joints)) - 3.0)
-    heavy = {
-        name: 500.0 for name in rig.parameters if name.rpartition(".")[2] in ("payload", "mass")
-    }
-    loaded = RigModel(rig.with_parameters(heavy))
-    with pytest.raises(ParameterError, match=r"no pressures hold joint_angle\."):
-        RigController(loaded, law_of(loaded)).holding(angle)
+    first, alone = controller.tracked[0], linear_controller(PID(1.0), {"joint_angle": 0.5})
+    aside, far = {**start, first: start[first] + 0.1}, np.zeros(len(controller.joints)) - 3.0
+    heavy = [name for name in rig.parameters if name.rpartition(".")[2] in ("payload", "mass")]
+    loaded = controller_of(rig.with_parameters(dict.fromkeys(heavy, 500.0)), {})
+    refused(
+        ("margins_of_each", lambda: margins(model, linear)),
+        (
+            "command = 'valve_command.other'",
+            lambda: margins(model, linear, command="valve_command.other"),
+        ),
+        ("one without a name", lambda: loop_matrix(model, alone)),
+        ("angle is missing", lambda: linearise(rig)),
+        ("does not rest", lambda: linearise(rig, initial=aside)),
+        (
+            r"point has no joint_angle\.",
+            lambda: linear_controller(controller, {"joint_angle": 0.5}),
+        ),
+        (r"angle = .* one number each is needed, joint_angle", lambda: controller.holding(far)),
+        (r"no pressures hold joint_angle\.", lambda: loaded.holding(angle)),
+    )

@@ -20,7 +20,7 @@ from pamrs.control import (
 from pamrs.control.trajectories import cosine_cycles, degrees
 from pamrs.design import lift
 from pamrs.errors import ParameterError
-from tests.reference.planar import Link, PlanarArm
+from tests.control.helpers import reference_arm
 from tests.reference.plant import Arm
 
 PERIOD = 0.005
@@ -58,12 +58,7 @@ def test_the_model_of_several_joints_is_the_equation_of_the_reference():
     rig = pamrs.rigs.named("two_joint_arm").with_parameters(
         {"arm.base_angle": 0.6, "joint.wrist.stiffness": 4.0, "joint.wrist.spring_angle": 0.3}
     )
-    links = [
-        Link(t["length"], t["mass"], t["centre"], t["inertia"], t["payload"])
-        for t in rig.tables("link").values()
-    ]
-    arm = PlanarArm(links, rig.model["arm"]["gravity"], 0.6)
-    model = PlanarArmModel.from_rig(rig)
+    arm, model = reference_arm(rig, 0.6), PlanarArmModel.from_rig(rig)
     for _ in range(10):
         angle, rate, acceleration = rng.uniform(-2.0, 2.0, (3, 2))
         expected = np.array(arm.inverse_dynamics(angle.tolist(), rate.tolist(), acceleration))
