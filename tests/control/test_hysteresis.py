@@ -76,10 +76,8 @@ def test_slip_memory_is_the_maxwell_slip_of_the_core():
 def rms(controller, rig):
     simulator = pamrs.Simulator(rig, sample_time=PERIOD)
     run = simulator.control(lambda m: controller.update(m["time"], m, smooth(m["time"])), 16.0)
-    wanted = np.array([smooth(float(t)).angle for t in run["time"]])
-    return float(
-        np.degrees(np.sqrt(np.mean((run["joint_angle"] - wanted)[run["time"] > 5.0] ** 2)))
-    )
+    error = run["joint_angle"] - [smooth(float(t)).angle for t in run["time"]]
+    return float(np.degrees(np.sqrt(np.mean(error[run["time"] > 5.0] ** 2))))
 
 
 @pytest.mark.parametrize("source", ["desired", "measured"])

@@ -59,15 +59,16 @@ def even_valves(name, angle, **options):
     return pamrs.Rig(name, model)
 
 
-def law_of(model, **changes):
-    return model.law(
-        "sliding",
-        **{"slope": 8.0, "switching": 4e3, "boundary_layer": 2.0, "period": PERIOD, **changes},
-    )
-
-
 def controller_of(rig, options, **changes):
-    return RigController(RigModel(rig), law_of(RigModel(rig), **changes), **options)
+    model, gains = RigModel(rig), {"slope": 8.0, "switching": 4e3, "boundary_layer": 2.0}
+    law = model.law("sliding", **{**gains, "period": PERIOD, **changes})
+    return RigController(model, law, **options)
+
+
+def at_rest(rig, start, **held):
+    """Half a second from a start, the valves shut unless another input is held."""
+    commands = held or {"valve_command": {name: np.full(501, 5.0) for name in rig.tables("valve")}}
+    return pamrs.simulate(rig, **commands, sample_time=0.001, initial=start)
 
 
 CASES = {
@@ -88,26 +89,16 @@ def held(request):
 
 
 def resting(angle, joints):
-    if len(joints) == 1:
-        return step(float(angle), float(angle), duration=1.0)
-    return {
-        name: step(float(one), float(one), duration=1.0)
-        for name, one in zip(joints, angle, strict=True)
-    }
+    angles = zip(joints, np.atleast_1d(angle).tolist(), strict=True)
+    return {name: step(one, one, duration=1.0) for name, one in angles}
 
 
 def test_what_holds_a_rig_holds_it(held):
     rig, controller, start, model, linear, angle = held
-    valves = list(rig.tables("valve"))
-    run = pamrs.simulate(
-        rig,
-        {name: np.full(501, 5.0) for name in valves},
-        sample_time=0.001,
-        initial=start,
-    )
+    run = at_rest(rig, start)
     for name, wanted in zip(controller.tracked, np.atleast_1d(angle), strict=True):
         assert np.abs(run[name] - wanted).max() < 1e-6
-    assert linear.outputs == tuple(f"valve_command.{name}" for name in valves)
+    assert linear.outputs == tuple(f"valve_command.{name}" for name in rig.tables("valve"))
     assert linear.command == pytest.approx(dict.fromkeys(linear.outputs, 5.0), abs=1e-5)
     assert model.inputs == linear.outputs
     assert set(linear.inputs) <= set(model.outputs)
@@ -121,17 +112,9 @@ def test_the_nonlinear_loop_moves_as_the_linear_one(held):
     controller.reset()
     for k in range(3):
         controller.update(k * PERIOD, model.point, Reference(angle))
-    run = closed_loop(
-        rig,
-        controller,
-        aim,
-        0.5,
-        initial={**start, pushed: start[pushed] + aside},
-        sample_time=PERIOD,
-        step=1e-4,
-        start=3 * PERIOD,
-        reset=False,
-    )
+    from_there = {**start, pushed: start[pushed] + aside}
+    on = {"sample_time": PERIOD, "step": 1e-4, "start": 3 * PERIOD, "reset": False}
+    run = closed_loop(rig, controller, aim, 0.5, initial=from_there, **on)
     matrix = loop_matrix(model, linear)
     x = np.zeros((run.time.size, matrix.shape[0]))
     x[0, model.states.index(pushed)] = aside
@@ -220,12 +203,7 @@ def test_a_regulated_rig_has_its_set_pressure_as_input():
     assert margins(model, linear).stable
     # what is driven moves as the simulation does
     step_of = 50.0  # so that the flow stays in the straight piece of its law
-    run = pamrs.simulate(
-        rig,
-        supply_command=np.full(201, start["supply_pressure"] + step_of),
-        sample_time=0.001,
-        initial=start,
-    )
+    run = at_rest(rig, start, supply_command=np.full(201, start["supply_pressure"] + step_of))
     phi, gamma = model.sampled(0.001)
     x = np.zeros((201, len(model.states)))
     for k in range(200):
@@ -248,9 +226,8 @@ def test_a_regulator_in_front_of_a_valve_is_held(name):
 
 
 def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
-    rig = even_valves("antagonistic_joint", ELBOW, stiffness=18.0)
-
     options = {"stiffness": 18.0}
+    rig = even_valves("antagonistic_joint", ELBOW, **options)
 
     def hold(loaded):
         return controller_of(loaded, options).holding(ELBOW)
@@ -282,21 +259,14 @@ def test_what_a_share_of_groups_asks_for_holds_too(degrees):
     start = controller.holding(angle)
     assert controller.state == before
     assert start["muscle_pressure.pair_2"] == start["muscle_pressure.pair_3"] == 0.0
-    run = pamrs.simulate(
-        rig,
-        {name: np.full(501, 5.0) for name in rig.tables("valve")},
-        sample_time=0.001,
-        initial=start,
-    )
-    assert np.abs(run["joint_angle.shoulder"] - angle).max() < 1e-7
+    assert np.abs(at_rest(rig, start)["joint_angle.shoulder"] - angle).max() < 1e-7
     linearise(rig, initial=start)
     # one pair holds the arm and what the others push, 3.5 N for each muscle at its lever
-    c1, c2 = RigModel(rig).torques_of("shoulder")[0].at(angle)
+    model, joint = RigModel(rig), pamrs.Joint.from_model(rig.tables("joint")["shoulder"])
+    c1, c2 = model.torques_of("shoulder")[0].at(angle)
     asked = c1 * start["muscle_pressure.pair_1"] + c2
-    pushed = (
-        4.0 * 3.5 * float(pamrs.Joint.from_model(rig.tables("joint")["shoulder"]).torque_arm(angle))
-    )
-    assert asked - RigModel(rig).arm.weight * math.sin(angle) == pytest.approx(pushed, rel=0.01)
+    pushed = 4.0 * 3.5 * float(joint.torque_arm(angle))
+    assert asked - model.arm.weight * math.sin(angle) == pytest.approx(pushed, rel=0.01)
 
 
 def test_a_regulator_and_a_pressure_that_is_prescribed_hold_too():
@@ -304,11 +274,9 @@ def test_a_regulator_and_a_pressure_that_is_prescribed_hold_too():
     model = pamrs.rigs.shoulder().model
     del model["valve"], model["supply"]
     prescribed = RigModel(pamrs.Rig("prescribed", model), pressure_limit=1e6)
-    for known in (regulated, prescribed):
+    for known, name in ((regulated, "supply_command"), (prescribed, "pressure")):
         start = RigController(known, known.law("sliding", period=PERIOD)).holding(ELBOW)
-        held = np.full(501, start["muscle_pressure"])
-        name = "supply_command" if known is regulated else "pressure"
-        run = pamrs.simulate(known.rig, **{name: held}, sample_time=0.001, initial=start)
+        run = at_rest(known.rig, start, **{name: np.full(501, start["muscle_pressure"])})
         assert np.abs(run["joint_angle"] - ELBOW).max() < 1e-6
 
 

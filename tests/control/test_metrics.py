@@ -8,6 +8,7 @@ from scipy.integrate import trapezoid
 
 from pamrs.control import metrics as m
 from pamrs.errors import ParameterError
+from tests.simulation.refusals import refused
 
 
 def second_order(zeta, w, time):
@@ -39,9 +40,8 @@ def test_curvature_depends_on_the_unit_and_does_not_cancel():
     # value
     for unit, scale in (("rad", 1.0), ("deg", 180 / math.pi)):
         v = 0.5 * scale
-        assert m.total_curvature(time, angle, rate=rate, unit=unit) == pytest.approx(
-            4 * v / math.sqrt(1 + v * v), rel=1e-9
-        )
+        found = m.total_curvature(time, angle, rate=rate, unit=unit)
+        assert found == pytest.approx(4 * v / math.sqrt(1 + v * v), rel=1e-9)
     # a moving arm's wiggle counts less in degrees: same wiggle at rest and on a ramp of 10 deg/s
     wiggle, ramp = 1e-3 * np.sin(20 * time), math.radians(10) * time
     ratio = {
@@ -94,9 +94,8 @@ def test_a_batch_is_its_runs():
             assert isinstance(getattr(one, name), float)
             assert getattr(together, name)[k] == pytest.approx(getattr(one, name), rel=1e-12)
         for part, values in one.phases.items():
-            assert {n: together.phases[part][n][k] for n in values} == pytest.approx(
-                values, rel=1e-12
-            )
+            found = {name: of[k] for name, of in together.phases[part].items()}
+            assert found == pytest.approx(values, rel=1e-12)
     # squared errors of the parts add up to that of the whole
     whole = together.phases["first"]["rms"] ** 2 * 1.0 + together.phases["later"]["rms"] ** 2 * 11.0
     assert whole == pytest.approx(together.squared_error)
@@ -112,34 +111,27 @@ def test_combined_is_one_at_best_and_ranks_by_weights():
     assert m.combined(nu, omega, weights=(1.0, 0.0))[0, 0] == 1.0
 
 
-@pytest.mark.parametrize(
-    ("call", "word"),
-    [
-        (lambda: m.squared_error([0, 1, 1], [0, 0, 0], [0, 0, 0]), "time"),
-        (lambda: m.squared_error([0, 1], [0, 0], [0, 0, 0]), "angle"),
-        (lambda: m.squared_error([0, 1], [0, 0, 0], [0, 0]), "reference"),
-        (lambda: m.squared_error([0, 1], [0, 0], [0, 0], unit="grad"), "unit"),
-        (lambda: m.curvature([0, 1], [0, 0]), "three"),
-        (lambda: m.total_curvature([0, 1, 2], [0, 0, 0], rate=[0, 0]), "rate"),
-        (lambda: m.combined([1.0], [1.0, 2.0]), "shapes"),
-        (lambda: m.combined([1.0], [1.0], weights=(-1.0, 1.0)), "weights"),
-        (lambda: m.combined([math.nan], [1.0]), "failed"),
-        (lambda: m.combined([0.0, 1.0], [1.0, 1.0]), "error = 0"),
-        (lambda: m.steady_error([0, 1], [0, 1], [0, 1], window=2.0), "window"),
-    ],
-)
-def test_bad_input_is_named(call, word):
-    with pytest.raises(ParameterError, match=word):
-        call()
+def test_bad_input_is_named():
+    refused(
+        ("time", lambda: m.squared_error([0, 1, 1], [0, 0, 0], [0, 0, 0])),
+        ("angle", lambda: m.squared_error([0, 1], [0, 0], [0, 0, 0])),
+        ("reference", lambda: m.squared_error([0, 1], [0, 0, 0], [0, 0])),
+        ("unit", lambda: m.squared_error([0, 1], [0, 0], [0, 0], unit="grad")),
+        ("three", lambda: m.curvature([0, 1], [0, 0])),
+        ("rate", lambda: m.total_curvature([0, 1, 2], [0, 0, 0], rate=[0, 0])),
+        ("shapes", lambda: m.combined([1.0], [1.0, 2.0])),
+        ("weights", lambda: m.combined([1.0], [1.0], weights=(-1.0, 1.0))),
+        ("failed", lambda: m.combined([math.nan], [1.0])),
+        ("error = 0", lambda: m.combined([0.0, 1.0], [1.0, 1.0])),
+        ("window", lambda: m.steady_error([0, 1], [0, 1], [0, 1], window=2.0)),
+    )
 
 
 def test_what_is_not_finite_is_refused_or_a_run_that_failed():
     time = np.linspace(0.0, 2.0, 201)
     good = 1.0 - np.exp(-3.0 * time)
-    bad = good.copy()
-    bad[50] = math.nan
-    late = good.copy()
-    late[5] = math.inf
+    bad, late = good.copy(), good.copy()
+    bad[50], late[5] = math.nan, math.inf
     reference = np.ones_like(time)
     functions = {
         "nu": lambda y: m.squared_error(time, reference, y),

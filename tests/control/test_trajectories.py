@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pamrs.control import trajectories as tr
-from pamrs.errors import ParameterError
+from tests.simulation.refusals import refused
 
 DEG = math.pi / 180.0
 
@@ -113,22 +113,17 @@ def test_a_table_with_noise_is_smoothed():
     assert tr.from_samples(time + 100.0, noisy)(1.0) == pytest.approx(through(1.0), abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("call", "word"),
-    [
-        (lambda: tr.lift_hold_return(0.2, math.nan), "high"),
-        (lambda: tr.lift_hold_return(0.2, 1.0, ramp=0.0), "ramp"),
-        (lambda: tr.lift_hold_return(0.2, 1.0, duration=14.0), "duration"),
-        (lambda: tr.step(0.0, 1.0, at=9.0), "at = 9"),
-        (lambda: tr.cosine_cycles(0.2, 1.0, cycles=0), "cycles"),
-        (lambda: tr.compound(bias=math.inf), "bias"),
-        (lambda: tr.from_samples([0, 1, 2], [0, 1, 2]), "n >= 5"),
-        (lambda: tr.from_samples([0, 1, 1, 2, 3], [0, 1, 2, 3, 4]), r"time\[2\]"),
-        (lambda: tr.from_samples(range(5), range(5), smoothing=-1.0), "smoothing"),
-        (lambda: tr.step(0.0, 1.0)(math.nan), "time"),
-        (lambda: tr.step(0.0, 1.0).sampled(0.0), "sample_time"),
-    ],
-)
-def test_bad_input_is_named(call, word):
-    with pytest.raises(ParameterError, match=word):
-        call()
+def test_bad_input_is_named():
+    refused(
+        ("high", lambda: tr.lift_hold_return(0.2, math.nan)),
+        ("ramp", lambda: tr.lift_hold_return(0.2, 1.0, ramp=0.0)),
+        ("duration", lambda: tr.lift_hold_return(0.2, 1.0, duration=14.0)),
+        ("at = 9", lambda: tr.step(0.0, 1.0, at=9.0)),
+        ("cycles", lambda: tr.cosine_cycles(0.2, 1.0, cycles=0)),
+        ("bias", lambda: tr.compound(bias=math.inf)),
+        ("n >= 5", lambda: tr.from_samples([0, 1, 2], [0, 1, 2])),
+        (r"time\[2\]", lambda: tr.from_samples([0, 1, 1, 2, 3], [0, 1, 2, 3, 4])),
+        ("smoothing", lambda: tr.from_samples(range(5), range(5), smoothing=-1.0)),
+        ("time", lambda: tr.step(0.0, 1.0)(math.nan)),
+        ("sample_time", lambda: tr.step(0.0, 1.0).sampled(0.0)),
+    )

@@ -13,6 +13,7 @@ from pamrs.design import Filling
 from pamrs.design.sizing import Candidate, Requirement, SizingResult, packed_diameter, size
 from pamrs.errors import ParameterError
 from tests.reference.gas import orifice_flow
+from tests.simulation.refusals import refused
 
 PAIR = ("elbow_0625in", "large_2in_effective")
 ONE_POINT = Requirement([(0.0, 15e3)])
@@ -175,38 +176,33 @@ def test_sonic_conductance_gives_the_choked_flow():
     )
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: Requirement([]), "points has shape"),
-        (lambda: Requirement([(0.0, 1.0, 2.0)]), "points has shape"),
-        (lambda: Requirement([(0.0, math.nan)]), "finite"),
-        (lambda: Requirement([(0.0, -1.0)]), "none below zero"),
-        (lambda: Requirement([(0.1, 1.0), (0.0, 1.0)]), "increase"),
-        (lambda: Requirement([(0.0, 0.0)]), "no force is wanted"),
-        (lambda: Requirement([(0.0, 1.0)], position="angle"), "position = 'angle'"),
-        (lambda: Candidate.from_library("elbow_0625in", pressure=-1.0), "pressure = -1"),
-        (lambda: Candidate.from_library("elbow_0625in", count=0), "count = 0"),
-        (lambda: Candidate("x", library.elbow_0625in(), "x"), "pressure = 'x' is not allowed"),
-        (lambda: Candidate("x", library.elbow_0625in(), 1e5, mass=math.inf), "mass = inf"),
-        (lambda: Filling(area=0.0), "area = 0"),
-        (lambda: Filling(dead_volume=-1.0), "dead_volume"),
-        (lambda: Filling.from_sonic_conductance(math.nan), "conductance = nan"),
-        (lambda: Filling().time(1e-3, 14e5), "not below the supply's"),
-        (lambda: Filling().time(0.0, 1e5), "volume = 0"),
-        (lambda: packed_diameter(0, 0.01), "count = 0"),
-        (lambda: packed_diameter(math.nan, 0.01), "count = nan"),
-        (lambda: packed_diameter(3, 0.0), "diameter = 0"),
-        (lambda: size([], ONE_POINT), "candidates is empty"),
-        (lambda: size(["elbow_0625in", "elbow_0625in"], ONE_POINT), "used twice"),
-        (lambda: size(["elbow"], ONE_POINT), "not in the library"),
-        (lambda: size(["elbow_0625in"], ONE_POINT, core=-1.0), "core"),
-        (lambda: size(["elbow_0625in"], ONE_POINT, max_count=0), "max_count = 0"),
-    ],
-)
-def test_bad_input_is_named(call, message):
-    with pytest.raises(ParameterError, match=message):
-        call()
+def test_bad_input_is_named():
+    refused(
+        ("points has shape", lambda: Requirement([])),
+        ("points has shape", lambda: Requirement([(0.0, 1.0, 2.0)])),
+        ("finite", lambda: Requirement([(0.0, math.nan)])),
+        ("none below zero", lambda: Requirement([(0.0, -1.0)])),
+        ("increase", lambda: Requirement([(0.1, 1.0), (0.0, 1.0)])),
+        ("no force is wanted", lambda: Requirement([(0.0, 0.0)])),
+        ("position = 'angle'", lambda: Requirement([(0.0, 1.0)], position="angle")),
+        ("pressure = -1", lambda: Candidate.from_library("elbow_0625in", pressure=-1.0)),
+        ("count = 0", lambda: Candidate.from_library("elbow_0625in", count=0)),
+        ("pressure = 'x' is not allowed", lambda: Candidate("x", library.elbow_0625in(), "x")),
+        ("mass = inf", lambda: Candidate("x", library.elbow_0625in(), 1e5, mass=math.inf)),
+        ("area = 0", lambda: Filling(area=0.0)),
+        ("dead_volume", lambda: Filling(dead_volume=-1.0)),
+        ("conductance = nan", lambda: Filling.from_sonic_conductance(math.nan)),
+        ("not below the supply's", lambda: Filling().time(1e-3, 14e5)),
+        ("volume = 0", lambda: Filling().time(0.0, 1e5)),
+        ("count = 0", lambda: packed_diameter(0, 0.01)),
+        ("count = nan", lambda: packed_diameter(math.nan, 0.01)),
+        ("diameter = 0", lambda: packed_diameter(3, 0.0)),
+        ("candidates is empty", lambda: size([], ONE_POINT)),
+        ("used twice", lambda: size(["elbow_0625in", "elbow_0625in"], ONE_POINT)),
+        ("not in the library", lambda: size(["elbow"], ONE_POINT)),
+        ("core", lambda: size(["elbow_0625in"], ONE_POINT, core=-1.0)),
+        ("max_count = 0", lambda: size(["elbow_0625in"], ONE_POINT, max_count=0)),
+    )
 
 
 def test_a_muscle_whose_geometry_has_no_solution_is_infeasible():
