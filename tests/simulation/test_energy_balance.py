@@ -116,10 +116,9 @@ def _anew(name: str) -> pamrs.Rig:
 )
 def test_mass_and_energy_close_while_an_arm_moves(name: str) -> None:
     """A rig written anew: what it stores is what came in, to 1e-9 of what moved."""
-    usual, rig = RUNS[name], _anew(name)
-    run = pamrs.simulate(
-        rig, sample_time=usual.sample_time, step=1e-4, initial=dict(usual.initial), **usual.keywords
-    )
+    usual = RUNS[name]
+    drive = {"sample_time": usual.sample_time, "initial": dict(usual.initial), **usual.keywords}
+    run = pamrs.simulate(_anew(name), step=1e-4, **drive)
     balance = run.balance
     moved = balance.supplied + balance.vented + abs(balance.stored)
     assert abs(balance.residual) < 1e-9 * moved

@@ -56,9 +56,8 @@ def test_steps_on_the_frame_are_the_run() -> None:
     rig = pamrs.rigs.bench(muscle())
     length = np.linspace(0.276, 0.25, 30)
     whole = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(30, 2e5))
-    one = pamrs.Simulator(
-        rig, sample_time=0.01, initial={"muscle_pressure": 2e5, "length": float(length[0])}
-    )
+    start = {"muscle_pressure": 2e5, "length": float(length[0])}
+    one = pamrs.Simulator(rig, sample_time=0.01, initial=start)
     for row in range(1, 30):
         sample = one.step(length=float(length[row]), pressure=2e5)
         assert sample["muscle_force"] == whole["muscle_force"][row]
@@ -67,9 +66,8 @@ def test_steps_on_the_frame_are_the_run() -> None:
 def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
     real = muscle().replace(friction_coefficient=0.0)
     p, e = (grid.ravel() for grid in np.meshgrid([2e5, 4e5, 6e5], np.linspace(0.0, 0.25, 8)))
-    data = ForceMap.from_arrays(
-        length=0.276 * (1.0 - e), pressure=p, force=real.force(p, e), rest_length=0.276
-    )
+    measured = {"length": 0.276 * (1.0 - e), "pressure": p, "force": real.force(p, e)}
+    data = ForceMap.from_arrays(**measured, rest_length=0.276)
     rig = parse_rig(fit_muscle(data, real, order=2).to_rig().to_toml_text())
     length = np.linspace(0.276, 0.21, 50)
     run = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(50, 3e5))
@@ -87,24 +85,16 @@ def test_what_a_frame_cannot_do_is_named(arguments: dict[str, object], message: 
 
 
 def test_only_a_frame_takes_a_length_and_no_valve_a_pressure() -> None:
-    bench, arm, sealed = (
-        pamrs.rigs.bench(muscle()),
-        pamrs.rigs.shoulder(),
-        pamrs.rigs.sealed_chamber(),
-    )
-    wrong = {"length": [0.27, 0.26], "initial": {"length": [0.27, 0.25]}, "sample_time": 0.01}
+    arm, sealed = pamrs.rigs.shoulder(), pamrs.rigs.sealed_chamber()
+    short = {"length": [0.27, 0.26], "sample_time": 0.01}
     pushed = {"pressure": [0.0, 1e5], "sample_time": 0.01}
+    bench, other = pamrs.rigs.bench(muscle()), {"initial": {"length": [0.27, 0.25]}}
+    # the row whose initial length is not that of the frame
+    told = r"= 0\.25 does .* length\[0\] = 0\.27 of row 1"
     refused(
-        (
-            "only a rig with a load frame",
-            lambda: pamrs.simulate(sealed, sample_time=0.1, length=[0.1, 0.1]),
-        ),
+        ("only a rig with a load frame", lambda: pamrs.simulate(sealed, **short)),
         (r"without \[valve\]", lambda: pamrs.simulate(arm, [5.0, 5.0], **pushed)),
-        # the row whose initial length is not that of the frame
-        (
-            r"= 0\.25 does .* length\[0\] = 0\.27 of row 1",
-            lambda: pamrs.simulate_batch(bench, **wrong),
-        ),
+        (told, lambda: pamrs.simulate_batch(bench, **short, **other)),
         by=pamrs.PamrsError,
     )
 
@@ -119,12 +109,10 @@ def test_loads_that_cannot_be_are_named(old: str, new: str, message: str) -> Non
 
 
 def test_a_load_and_a_joint_exclude_each_other() -> None:
-    load = (
-        '[load]\nkind = "frame"\nmin_length = { value = 200, unit = "mm" }\n'
-        'max_length = { value = 270, unit = "mm" }\n'
-    )
+    bench, arm = (rig.to_toml_text() for rig in (pamrs.rigs.bench(muscle()), pamrs.rigs.shoulder()))
+    load = bench[bench.index("\n[load]") :].split("\n\n")[0]
     with pytest.raises(pamrs.RigError, match=r"\[load\] does not go with \[joint\] and \[arm\]"):
-        parse_rig(pamrs.rigs.shoulder().to_toml_text() + load)
+        parse_rig(arm + load)
 
 
 def test_air_of_a_regulator_that_is_then_shut_is_at_room_temperature() -> None:

@@ -73,24 +73,19 @@ def test_rigs_with_effects_run_too():
 )
 def test_any_plant_is_the_one_that_simulate_gives(payload, dead_volume, command, angle):
     rig = pamrs.rigs.shoulder()
-    n = len(payload)
+    k = len(payload) // 2
     signal = np.where(np.arange(61) < 30, command, 5.0)
+    drive = {"sample_time": SAMPLE, "initial": {"joint_angle": angle}}
     run = pamrs.simulate_batch(
         rig,
         signal,
-        sample_time=SAMPLE,
+        **drive,
         parameters={"arm.payload": payload, "chamber.dead_volume": dead_volume},
-        initial={"joint_angle": angle},
         record=["joint_angle", "muscle_pressure", "mass_supplied"],
         reduce={"peak": ("peak", "joint_rate"), "end": ("final", "joint_angle")},
     )
-    k = n // 2
-    alone = pamrs.simulate(
-        rig.with_parameters({"arm.payload": payload[k], "chamber.dead_volume": dead_volume}),
-        signal,
-        sample_time=SAMPLE,
-        initial={"joint_angle": angle},
-    )
+    own = rig.with_parameters({"arm.payload": payload[k], "chamber.dead_volume": dead_volume})
+    alone = pamrs.simulate(own, signal, **drive)
     assert apart(run["joint_angle"][k], alone["joint_angle"]) < 1e-8
     assert apart(run["muscle_pressure"][k], alone["muscle_pressure"]) < 1e-7
     assert abs(run["mass_supplied"][k][-1] - alone["mass_supplied"][-1]) < 1e-10
@@ -114,14 +109,9 @@ def test_a_plant_that_leaves_the_model_ends_as_it_would_alone():
     rig = pamrs.rigs.shoulder().with_parameters({"joint.stop_stiffness": 5.0})
     command = np.full(ROWS, 6.0)
     thrown = np.array([0.0, -80.0, 0.0, -90.0])
-    run = pamrs.simulate_batch(
-        rig,
-        command,
-        sample_time=SAMPLE,
-        initial={"joint_rate": thrown},
-        record=["joint_angle"],
-        reduce={"end": ("final", "joint_angle")},
-    )
+    kept = {"record": ["joint_angle"], "reduce": {"end": ("final", "joint_angle")}}
+    drive = {"sample_time": SAMPLE, "initial": {"joint_rate": thrown}}
+    run = pamrs.simulate_batch(rig, command, **drive, **kept)
     assert run.failed.tolist() == [False, True, False, True]
     for k, rate in enumerate(thrown):
         start = {"joint_rate": rate}

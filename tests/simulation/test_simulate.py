@@ -39,9 +39,8 @@ def test_command_holds_until_the_next_row() -> None:
     np.testing.assert_array_equal(late["muscle_pressure"][:6], steady["muscle_pressure"][:6])
     assert late["muscle_pressure"][6] > steady["muscle_pressure"][6] + 100.0
     # The last command has no row after it.
-    np.testing.assert_array_equal(
-        run([6.0] * 10 + [9.0])["muscle_pressure"], run([6.0] * 11)["muscle_pressure"]
-    )
+    last, even = (run([6.0] * 10 + [volts])["muscle_pressure"] for volts in (9.0, 6.0))
+    np.testing.assert_array_equal(last, even)
 
 
 def test_unknown_channel_names_the_known_ones() -> None:
@@ -79,11 +78,8 @@ def test_a_command_beyond_its_valve_is_an_event_and_is_said() -> None:
     command[5:10], command[20:] = 50.0, -3.0
     result = run(command)
     told = [(round(e.time, 6), e.kind) for e in result.events if e.kind.startswith("command")]
-    assert told == [
-        (0.025, "command_clipped"),
-        (0.05, "command_in_range"),
-        (0.1, "command_clipped"),
-    ]
+    clipped, inside = "command_clipped", "command_in_range"
+    assert told == [(0.025, clipped), (0.05, inside), (0.1, clipped)]
     line = "valve: command clipped to its range of 0 to 10 V from 0.025 s to 0.05 s and once more; "
     assert line + "50 V was asked for" in result.summary().splitlines()
     assert [e.time for e in result.events] == sorted(e.time for e in result.events)

@@ -22,11 +22,8 @@ COMMAND = 5.0 + 1.2 * np.sin(np.arange(300) * 0.05)
 def rig() -> pamrs.Rig:
     """The shoulder with everything on that has a memory."""
     friction = {"friction_constant": 2.0, "friction_pressure": 2e-5, "presliding": 1e-3}
-    return (
-        pamrs.rigs.shoulder()
-        .with_effect("muscle_hysteresis", friction)
-        .with_effect("heat_transfer")
-    )
+    warm = pamrs.rigs.shoulder().with_effect("heat_transfer")
+    return warm.with_effect("muscle_hysteresis", friction)
 
 
 def simulator(**changes: float) -> pamrs.Simulator:
@@ -56,9 +53,8 @@ def test_reset_begins_again_with_other_values() -> None:
 
 
 def test_a_rig_without_a_valve_needs_no_command() -> None:
-    chamber = pamrs.Simulator(
-        pamrs.rigs.sealed_chamber(), sample_time=0.1, initial={"muscle_pressure": 5e5}
-    )
+    rig, start = pamrs.rigs.sealed_chamber(), {"muscle_pressure": 5e5}
+    chamber = pamrs.Simulator(rig, sample_time=0.1, initial=start)
     assert chamber.step()["muscle_pressure"] == pytest.approx(5e5)
 
 
@@ -149,9 +145,8 @@ def test_an_answer_that_cannot_be_is_named_and_stops_the_loop_at_its_sample(
 def test_an_animation_lasts_as_long_as_it_says(tmp_path) -> None:
     duration, speed = 0.5, 2.5
     image = pytest.importorskip("PIL.Image")
-    run = pamrs.simulate(
-        pamrs.rigs.shoulder(), np.full(int(duration * 50) + 1, 5.2), sample_time=0.02
-    )
+    command = np.full(int(duration * 50) + 1, 5.2)
+    run = pamrs.simulate(pamrs.rigs.shoulder(), command, sample_time=0.02)
     lasts = 0.0
     with image.open(run.animate(tmp_path / "arm.gif", speed=speed)) as picture:
         for frame in range(picture.n_frames):

@@ -34,20 +34,17 @@ def test_the_core_refuses_them_by_itself():
 
 
 def test_kept_channels_are_counted_together():
+    many = {"n": 10**6, "record": ["joint_angle", "muscle_pressure"]}
     with pytest.raises(ParameterError, match="at most 250000000 numbers"):
-        pamrs.simulate_batch(
-            SHOULDER, COMMAND, sample_time=0.005, n=10**6, record=["joint_angle", "muscle_pressure"]
-        )
+        pamrs.simulate_batch(SHOULDER, COMMAND, sample_time=0.005, **many)
 
 
 @pytest.mark.parametrize("values", [np.broadcast_to(5.0, 10**12), {"a": 1}, [10**400], "many"])
 def test_what_is_no_array_of_numbers_is_refused(values):
-    with pytest.raises(ParameterError):
-        pamrs.simulate_batch(SHOULDER, values, sample_time=0.005, n=2, reduce=END)
-    with pytest.raises(ParameterError):
-        pamrs.simulate_batch(
-            SHOULDER, COMMAND, sample_time=0.005, n=2, parameters={"arm.payload": values}
-        )
+    varied = {"parameters": {"arm.payload": values}}
+    for command, options in ((values, {"reduce": END}), (COMMAND, varied)):
+        with pytest.raises(ParameterError):
+            pamrs.simulate_batch(SHOULDER, command, sample_time=0.005, n=2, **options)
 
 
 @pytest.mark.parametrize("time", [1e300, 1e9])
@@ -69,18 +66,11 @@ def test_a_run_of_too_many_rows_is_refused(duration, sample_time):
     )
 
 
-@pytest.mark.parametrize(
-    "state",
-    [
-        np.broadcast_to(1.0, 10**9),
-        {"samples": 1},
-        "x",
-        None,
-        [10**400],
-        [float("nan")] * 5,
-        [[1.0], [2.0, 3.0]],
-    ],
-)
+NO_STATES = (np.broadcast_to(1.0, 10**9), {"samples": 1}, "x", None, [10**400])
+NO_STATES += ([float("nan")] * 5, [[1.0], [2.0, 3.0]])
+
+
+@pytest.mark.parametrize("state", NO_STATES)
 def test_a_state_that_is_none_is_refused(state):
     one = pamrs.Simulator(SHOULDER, sample_time=0.005)
     many = pamrs.Batch(SHOULDER, n=2, sample_time=0.005)
