@@ -75,10 +75,8 @@ def test_a_batch_is_its_plants_and_a_sweep_of_gains_its_gains(name, factors):
 @pytest.mark.parametrize("shape", [(), (2,)])
 def test_a_controller_goes_on_from_a_pickle_and_from_its_state_bit_for_bit(name, shape):
     controller = CONTROLLERS[name](1.0)
-    rows = [
-        singles(told(name, sample)) if shape == () else told(name, sample)
-        for sample in samples(60, seed=5, shape=shape)
-    ]
+    rows = [told(name, sample) for sample in samples(60, seed=5, shape=shape)]
+    rows = rows if shape else [singles(row) for row in rows]
 
     def play(one, numbers):
         answers = [one.update(k * PERIOD, rows[k], aim_of(name, k * PERIOD)) for k in numbers]
@@ -217,19 +215,11 @@ def test_what_is_not_a_state_is_refused_and_changes_nothing(name):
         inner[path[-1]] = value
         return state
 
-    def at(state, path):
-        return at(state[path[0]], path[1:]) if path else state
-
-    for one, fresh in (
-        (batch, CONTROLLERS[name](np.ones(3)).state),
-        (single, CONTROLLERS[name](1.0).state),
-    ):
-        state = one.state
+    nonsense = ["x", "1.0", [1.0, "a"], np.zeros((2, 3, 4)), np.zeros(5), [[1.0], [1.0, 2.0]]]
+    for one, gains in ((batch, np.ones(3)), (single, 1.0)):
+        state, fresh = one.state, dict(leaves(CONTROLLERS[name](gains).state))
         for path, _ in leaves(state):
-            wrong = ["x", "1.0", [1.0, "a"], np.zeros((2, 3, 4)), np.zeros(5), [[1.0], [1.0, 2.0]]]
-            if at(fresh, path) is not None:
-                wrong.append(None)
-            for bad in wrong:
+            for bad in nonsense + [None] * (fresh.get(path) is not None):
                 with pytest.raises(ParameterError, match="state"):
                     one.restore(changed(state, path, bad))
     # a state of three plants does not fit one of five, gains of three nothing else
@@ -249,9 +239,8 @@ ON_SHOULDER = [n for n in CONTROLLERS if n != "pressure loop" and not n.startswi
 @pytest.mark.parametrize("name", ON_SHOULDER)
 def test_the_loop_on_the_shoulder_stays_bounded(name):
     plant = SHOULDER if "hysteresis" not in name and "dead" not in name else DIAGNOSED
-    plant = plant.with_parameters(
-        {"muscle.modulus_scale": 1.04, "arm.payload": 9.3, "arm.coulomb": 2.0}
-    )
+    off = {"muscle.modulus_scale": 1.04, "arm.payload": 9.3, "arm.coulomb": 2.0}
+    plant = plant.with_parameters(off)
     controller, simulator = CONTROLLERS[name](1.0), pamrs.Simulator(plant, sample_time=PERIOD)
     run = simulator.control(lambda m: controller.update(m["time"], m, smooth(m["time"])), 16.0)
     time, angle = run["time"], run["joint_angle"]

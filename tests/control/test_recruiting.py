@@ -176,9 +176,8 @@ def test_a_group_that_is_not_used_takes_no_air_from_the_supply():
     run = closed_loop(light, following(model, shares=share), up)
     assert (run.command["valve_command.pair_3"] == 0.0).all()
     one = closed_loop(light, following(RigModel(light, active=["pair_1"])), up)
-    assert run.channels["mass_supplied"][-1] == pytest.approx(
-        one.channels["mass_supplied"][-1], rel=0.01
-    )
+    took, alone = (each.channels["mass_supplied"][-1] for each in (run, one))
+    assert took == pytest.approx(alone, rel=0.01)
 
 
 def lifts_from_a_small_tank(pressure, active=None, **changes):
@@ -186,9 +185,8 @@ def lifts_from_a_small_tank(pressure, active=None, **changes):
     above the fullest muscles [Pa], of each; the most pairs that have air.
     """
     lifts, count = cosine_cycles(*degrees(15, 60), rise=1.5, hold=1.0, cycles=5), 5
-    rig = RIG.with_parameters(
-        {"arm.payload": 12.0, "supply.volume": 0.006, "supply.initial_pressure": pressure}
-    )
+    tank = {"supply.volume": 0.006, "supply.initial_pressure": pressure}
+    rig = RIG.with_parameters({"arm.payload": 12.0, **tank})
     model = RigModel(rig, active=active)
     torques, limit = model.torques_of("shoulder"), model.pressure_limit
     share = None if active else Recruitment(torques, limit, period=PERIOD, **changes)
