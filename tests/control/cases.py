@@ -28,6 +28,7 @@ from pamrs.control import (
     Sliding,
     cascaded_pid,
 )
+from pamrs.control._protocol import commands_of
 from tests.tables import rows_of
 
 SHOULDER = pamrs.rigs.shoulder()
@@ -59,139 +60,104 @@ def rows(x):
     return np.tile(x, 2) if isinstance(x, np.ndarray) else x
 
 
+def forward(km, model=FULL, **options):
+    """A feedforward of the shoulder."""
+    return Feedforward(model, AIR, km, period=PERIOD, **options)
+
+
+def follow(law, model, *gains, **options):
+    """A law that asks for a pressure, and the loop that makes it."""
+    return Cascade(law(model, *gains, period=PERIOD, **options))
+
+
+def whole(model, kind, *, stiffness=None, km=20.0, shares=None, **gains):
+    """A law for every command of a rig."""
+    law = model.law(kind, period=PERIOD, **gains)
+    return RigController(model, law, stiffness=stiffness, km=km, shares=shares)
+
+
+def recruited():
+    """How the groups of a bundle are recruited."""
+    torques, quick = WHOLE.torques_of("shoulder"), {"dwell": 0.1, "add_at": 0.3, "drop_at": 0.2}
+    return Recruitment(torques, WHOLE.pressure_limit, period=PERIOD, **quick)
+
+
+def by_length(slope):
+    """A law that is told the shortening of the muscle of a mass."""
+    surface = {"slope": slope, "switching": 4e3, "boundary_layer": 0.01}
+    law, loop = Sliding(MASS.arm, **surface, period=PERIOD), MASS.pressure_loop("", period=PERIOD)
+    return ByLength(Cascade(law, loop), MASS.rig)
+
+
+BACK = {"anti_windup": "back_calculation", "angle_filter": 0.01}
 # name -> a function of a factor on its gains (a float or an array)
 CONTROLLERS = {
     "pid": lambda x: PID(2.0 * x, 1.5, 0.1, period=PERIOD),
-    "pid back-calculation": lambda x: PID(
-        1.0 * x, 0.3, 0.05, anti_windup="back_calculation", period=PERIOD, angle_filter=0.01
-    ),
+    "pid back-calculation": lambda x: PID(1.0 * x, 0.3, 0.05, period=PERIOD, **BACK),
     "pid measured rate": lambda x: PID(2.0, 1.5, 0.2 * x, period=PERIOD, measured_rate=True),
     "fuzzy": lambda x: Fuzzy(1.0 * x, 0.5, 0.5, period=PERIOD, output_filter=0.02),
     "fuzzy quoted": lambda x: Fuzzy(
         1.0, 0.5 * x, 0.5 * x, table="quoted", period=PERIOD, output_filter=0.02
     ),
-    "feedforward": lambda x: Feedforward(FULL, AIR, 1.0 * x, period=PERIOD),
-    "feedforward friction": lambda x: Feedforward(
-        FULL.scaled(x), AIR, 5.0, friction=True, pressure_filter=0.01, period=PERIOD
+    "feedforward": lambda x: forward(1.0 * x),
+    "feedforward friction": lambda x: forward(
+        5.0, FULL.scaled(x), friction=True, pressure_filter=0.01
     ),
-    "feedforward measured": lambda x: Feedforward(
-        FULL, AIR, 1.0 * x, motion="measured", lengthening=LENGTHENING, period=PERIOD
-    ),
-    "feedforward + pid": lambda x: Parallel(
-        Feedforward(FULL, AIR, 1.0, period=PERIOD), PID(x, 0.3, period=PERIOD)
-    ),
+    "feedforward measured": lambda x: forward(x, motion="measured", lengthening=LENGTHENING),
+    "feedforward + pid": lambda x: Parallel(forward(1.0), PID(x, 0.3, period=PERIOD)),
     "feedforward + fuzzy": lambda x: Parallel(
-        Feedforward(FULL, AIR, 2.0 * x, period=PERIOD), Fuzzy(0.8, 0.5, 0.5, period=PERIOD)
+        forward(2.0 * x), Fuzzy(0.8, 0.5, 0.5, period=PERIOD)
     ),
     "feedforward + cascade": lambda x: Parallel(
-        Feedforward(FULL, AIR, 0.5, period=PERIOD), cascaded_pid(1.38e6, kp=6e5 * x, period=PERIOD)
+        forward(0.5), cascaded_pid(1.38e6, kp=6e5 * x, period=PERIOD)
     ),
-    "feedforward pressure": lambda x: Cascade(
-        FeedforwardPressure(FULL.scaled(x), friction=True, period=PERIOD)
-    ),
+    "feedforward pressure": lambda x: follow(FeedforwardPressure, FULL.scaled(x), friction=True),
     "cascaded pid": lambda x: cascaded_pid(1.38e6, kp=6e5 * x, period=PERIOD),
     "cascaded pi": lambda x: cascaded_pid(1.38e6, kp=1e5 * x, ki=1e5, kd=0.0, period=PERIOD),
     "pressure loop": lambda x: PressureLoop(2e-4 * x, 2e-4, period=PERIOD),
-    "sliding": lambda x: Cascade(Sliding(SIMPLIFIED, slope=5.0 * x, period=PERIOD)),
-    "sliding signum": lambda x: Cascade(
-        Sliding(FULL, boundary_layer=0.0, switching=2e4 * x, period=PERIOD)
+    "sliding": lambda x: follow(Sliding, SIMPLIFIED, slope=5.0 * x),
+    "sliding signum": lambda x: follow(Sliding, FULL, boundary_layer=0.0, switching=2e4 * x),
+    "sliding estimates": lambda x: follow(Sliding, SIMPLIFIED.scaled(x)),
+    "adaptive": lambda x: follow(AdaptiveSliding, SIMPLIFIED, (1.0, 5.0, 300.0 * x)),
+    "adaptive free": lambda x: follow(
+        AdaptiveSliding, SIMPLIFIED, (x, x, x), bounds=None, hold_at_limit=False
     ),
-    "sliding estimates": lambda x: Cascade(Sliding(SIMPLIFIED.scaled(x), period=PERIOD)),
-    "adaptive": lambda x: Cascade(
-        AdaptiveSliding(SIMPLIFIED, (1.0, 5.0, 300.0 * x), period=PERIOD)
-    ),
-    "adaptive free": lambda x: Cascade(
-        AdaptiveSliding(SIMPLIFIED, (x, x, x), bounds=None, hold_at_limit=False, period=PERIOD)
-    ),
-    "adaptive published": lambda x: Cascade(
-        AdaptiveSliding.published(SIMPLIFIED, 1, slope=4.0 * x, period=PERIOD)
-    ),
-    "neural zero": lambda x: Cascade(Neural(SIMPLIFIED, slope=3.0 * x, period=PERIOD)),
-    "neural model": lambda x: Cascade(
-        Neural(FULL, start="model", gains=(300.0, 2e4, 3e5 * x), period=PERIOD)
-    ),
-    "neural gaylord": lambda x: Cascade(
-        Neural(GAYLORD, start="model", bounds=None, switching=4e5 * x, period=PERIOD)
+    "adaptive published": lambda x: follow(AdaptiveSliding.published, SIMPLIFIED, 1, slope=4.0 * x),
+    "neural zero": lambda x: follow(Neural, SIMPLIFIED, slope=3.0 * x),
+    "neural model": lambda x: follow(Neural, FULL, start="model", gains=(300.0, 2e4, 3e5 * x)),
+    "neural gaylord": lambda x: follow(
+        Neural, GAYLORD, start="model", bounds=None, switching=4e5 * x
     ),
     "hysteresis sliding": lambda x: HysteresisCompensation(
-        Cascade(Sliding(FULL, slope=5.0 * x, period=PERIOD)), DIAGNOSED
+        follow(Sliding, FULL, slope=5.0 * x), DIAGNOSED
     ),
     "hysteresis feedforward": lambda x: HysteresisCompensation(
-        Feedforward(FULL, AIR, 5.0 * x, period=PERIOD), DIAGNOSED, source="measured"
+        forward(5.0 * x), DIAGNOSED, source="measured"
     ),
-    "rig pair sliding": lambda x: RigController(
-        PAIR, PAIR.law("sliding", slope=8.0 * x, period=PERIOD), stiffness=15.0
-    ),
-    "rig pair feedforward": lambda x: RigController(
-        PAIR, PAIR.law("feedforward", period=PERIOD), stiffness=stiffer, km=20.0 * x
-    ),
-    "rig pair neural": lambda x: RigController(
-        PAIR, PAIR.law("neural", switching=4e4 * x, start="model", period=PERIOD)
-    ),
-    "rig arm feedforward": lambda x: RigController(
-        ARM, ARM.law("feedforward", period=PERIOD), km=20.0 * x
-    ),
-    "rig arm sliding": lambda x: RigController(
-        ARM, ARM.law("sliding", slope=rows(5.0 * x), period=PERIOD)
-    ),
-    "rig arm adaptive": lambda x: RigController(
-        ARM, ARM.law("adaptive", slope=rows(5.0 * x), period=PERIOD)
-    ),
-    "rig arm neural": lambda x: RigController(
-        ARM, ARM.law("neural", start="model", slope=rows(3.0 * x), period=PERIOD)
-    ),
-    "rig arm neural zero": lambda x: RigController(
-        ARM, ARM.law("neural", slope=rows(3.0 * x), period=PERIOD)
-    ),
-    "rig regulated adaptive": lambda x: RigController(
-        REGULATED, REGULATED.law("adaptive", slope=5.0 * x, period=PERIOD)
-    ),
-    "rig bundle sliding": lambda x: RigController(
-        BUNDLE, BUNDLE.law("sliding", switching=2e4 * x, period=PERIOD)
-    ),
-    "rig whole recruited": lambda x: RigController(
-        WHOLE,
-        WHOLE.law("sliding", switching=2e4 * x, period=PERIOD),
-        shares=Recruitment(
-            WHOLE.torques_of("shoulder"),
-            WHOLE.pressure_limit,
-            period=PERIOD,
-            dwell=0.1,
-            add_at=0.3,
-            drop_at=0.2,
-        ),
-    ),
-    "rig mass by length": lambda x: ByLength(
-        Cascade(
-            Sliding(MASS.arm, slope=5.0 * x, switching=4e3, boundary_layer=0.01, period=PERIOD),
-            MASS.pressure_loop("", period=PERIOD),
-        ),
-        MASS.rig,
-    ),
-    "rig mass adaptive": lambda x: RigController(
-        MASS, MASS.law("adaptive", slope=5.0 * x, period=PERIOD)
-    ),
+    "rig pair sliding": lambda x: whole(PAIR, "sliding", slope=8.0 * x, stiffness=15.0),
+    "rig pair feedforward": lambda x: whole(PAIR, "feedforward", stiffness=stiffer, km=20.0 * x),
+    "rig pair neural": lambda x: whole(PAIR, "neural", switching=4e4 * x, start="model"),
+    "rig arm feedforward": lambda x: whole(ARM, "feedforward", km=20.0 * x),
+    "rig arm sliding": lambda x: whole(ARM, "sliding", slope=rows(5.0 * x)),
+    "rig arm adaptive": lambda x: whole(ARM, "adaptive", slope=rows(5.0 * x)),
+    "rig arm neural": lambda x: whole(ARM, "neural", start="model", slope=rows(3.0 * x)),
+    "rig arm neural zero": lambda x: whole(ARM, "neural", slope=rows(3.0 * x)),
+    "rig regulated adaptive": lambda x: whole(REGULATED, "adaptive", slope=5.0 * x),
+    "rig bundle sliding": lambda x: whole(BUNDLE, "sliding", switching=2e4 * x),
+    "rig whole recruited": lambda x: whole(WHOLE, "sliding", switching=2e4 * x, shares=recruited()),
+    "rig mass by length": lambda x: by_length(5.0 * x),
+    "rig mass adaptive": lambda x: whole(MASS, "adaptive", slope=5.0 * x),
     "dead zone": lambda x: DeadZoneCompensation(PID(2.0 * x, 1.5, 0.1, period=PERIOD), DIAGNOSED),
 }
 
 
 def smooth(time):
     """From the stop at 15 deg smoothly up to 75 deg in 4 s, then slow waves about there."""
-    low, high, rise = math.radians(15.0), math.radians(75.0), 4.0
-    if time < rise:
-        w = math.pi / rise
-        half = 0.5 * (high - low)
-        return Reference(
-            low + half * (1.0 - math.cos(w * time)),
-            half * w * math.sin(w * time),
-            half * w * w * math.cos(w * time),
-        )
-    a, w, since = math.radians(10.0), 1.2, time - rise
-    return Reference(
-        high - a * (1.0 - math.cos(w * since)),
-        -a * w * math.sin(w * since),
-        -a * w * w * math.cos(w * since),
-    )
+    low, size, w, since = math.radians(15.0), math.radians(30.0), math.pi / 4.0, time
+    if time >= 4.0:
+        low, size, w, since = math.radians(75.0), -math.radians(10.0), 1.2, time - 4.0
+    cosine, sine = math.cos(w * since), math.sin(w * since)
+    return Reference(low + size * (1.0 - cosine), size * w * sine, size * w * w * cosine)
 
 
 def samples(count, seed=0, shape=()):
@@ -215,23 +181,15 @@ def told(name, sample):
     renamed = {}
     for channel in CHANNELS[name.split()[1]]:
         word, _, block = channel.partition(".")
-        if word == "length":
-            renamed[channel] = 0.275 - 0.03 * sample["joint_angle"]
-            continue
         # no two blocks see the same
-        renamed[channel] = sample[word] * (1.0 + 0.01 * len(block)) if block else sample[word]
+        value = 0.275 - 0.03 * sample["joint_angle"] if word == "length" else sample[word]
+        renamed[channel] = value * (1.0 + 0.01 * len(block)) if block else value
     return renamed
 
 
 def commands(answer):
     """The commands of an answer by name: one, or those of a rig."""
-    if not isinstance(answer, dict):
-        return {"": answer}
-    found = {}
-    for word, value in answer.items():
-        parts = value.items() if isinstance(value, dict) else [("", value)]
-        found |= {f"{word}.{name}": command for name, command in parts}
-    return found
+    return dict(commands_of(answer)) if isinstance(answer, dict) else {"": answer}
 
 
 #: What the controllers of each rig read.

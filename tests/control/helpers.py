@@ -1,11 +1,12 @@
 """A small PID for the tests of everything around controllers, whose gains may be arrays, one for
-each plant of a batch; rigs with another valve or supply.
+each plant of a batch; rigs with another valve or supply, or without friction.
 """
 
 import numpy as np
 
 import pamrs
 from pamrs.control import Controller
+from tests.reference.planar import Link, PlanarArm
 
 #: The shoulder's area as a conductance [m3/(s Pa)]: 1 mm2 is 0.199 l/(s bar).
 CONDUCTANCE = 8.4 * 0.1987e-8
@@ -28,6 +29,29 @@ def with_regulator(rig, **changes):
     model["supply"].pop("volume", None)
     model["supply"] |= {"kind": "regulator", "time_constant": 0.05, **changes}
     return pamrs.Rig(rig.name, model)
+
+
+def without_friction(name, **changes):
+    """A packaged rig without Coulomb friction and hysteresis, which no controller here models."""
+    rig = pamrs.rigs.named(name)
+    model = rig.with_parameters(changes).model
+    muscle = model["muscle"]
+    for table in [muscle] if "rest_length" in muscle else muscle.values():
+        table |= dict.fromkeys(
+            ("friction_coefficient", "friction_pressure_slope", "friction_floor"), 0.0
+        )
+    for table in [model["arm"]] if model["link"] is None else model["link"].values():
+        table["coulomb"] = 0.0
+    return pamrs.Rig(rig.name, model)
+
+
+def reference_arm(rig, tilt=0.0):
+    """The arm of several links of a rig as the reference has it."""
+    links = [
+        Link(t["length"], t["mass"], t["centre"], t["inertia"], t["payload"])
+        for t in rig.tables("link").values()
+    ]
+    return PlanarArm(links, rig.model["arm"]["gravity"], tilt)
 
 
 class SmallPid(Controller):

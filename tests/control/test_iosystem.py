@@ -5,7 +5,7 @@ import pytest
 
 import pamrs
 from pamrs.control.iosystem import initial_state, iosystem
-from pamrs.errors import ParameterError
+from tests.simulation.refusals import refused
 
 control = pytest.importorskip("control")
 
@@ -13,9 +13,8 @@ control = pytest.importorskip("control")
 @pytest.mark.parametrize("effect", [None, "muscle_hysteresis"])
 def test_its_response_is_the_simulation(effect):
     rig = pamrs.rigs.shoulder() if effect is None else pamrs.rigs.shoulder().with_effect(effect)
-    system = iosystem(
-        rig, sample_time=0.005, outputs=["joint_angle", "muscle_pressure", "air_mass"]
-    )
+    outputs = ["joint_angle", "muscle_pressure", "air_mass"]
+    system = iosystem(rig, sample_time=0.005, outputs=outputs)
     assert isinstance(system, control.NonlinearIOSystem)
     assert system.dt == 0.005
     assert system.input_labels == ["valve_command"]
@@ -36,13 +35,9 @@ def test_named_inputs_and_a_loop_in_python_control():
     assert system.output_labels == ["joint_angle_elbow"]
     # a proportional loop around the shoulder by control.interconnect, and by hand
     plant = iosystem(pamrs.rigs.shoulder(), sample_time=0.01, outputs=["joint_angle"], name="plant")
+    ends = {"inputs": ["joint_angle"], "outputs": ["valve_command"], "name": "law"}
     gain = control.NonlinearIOSystem(
-        None,
-        lambda t, x, u, p: 5.0 + 3.0 * (0.6 - u[0]),
-        inputs=["joint_angle"],
-        outputs=["valve_command"],
-        dt=0.01,
-        name="law",
+        None, lambda t, x, u, p: 5.0 + 3.0 * (0.6 - u[0]), dt=0.01, **ends
     )
     loop = control.interconnect([plant, gain], inputs=[], outputs=["joint_angle"])
     time = np.arange(101) * 0.01
@@ -54,17 +49,11 @@ def test_named_inputs_and_a_loop_in_python_control():
     assert np.ravel(response.outputs) == pytest.approx(alone["joint_angle"], abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("call", "word"),
-    [
-        (lambda: iosystem(pamrs.rigs.shoulder(), sample_time=0.0), "sample_time"),
-        (lambda: iosystem(pamrs.rigs.shoulder(), sample_time=0.01, outputs=["angle"]), "outputs"),
-        (
-            lambda: iosystem(pamrs.rigs.shoulder().with_effect("clock_skew"), sample_time=0.01),
-            "clock_skew",
-        ),
-    ],
-)
-def test_bad_input_is_named(call, word):
-    with pytest.raises(ParameterError, match=word):
-        call()
+def test_bad_input_is_named():
+    shoulder = pamrs.rigs.shoulder()
+    late = shoulder.with_effect("clock_skew")
+    refused(
+        ("sample_time", lambda: iosystem(shoulder, sample_time=0.0)),
+        ("outputs", lambda: iosystem(shoulder, sample_time=0.01, outputs=["angle"])),
+        ("clock_skew", lambda: iosystem(late, sample_time=0.01)),
+    )

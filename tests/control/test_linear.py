@@ -90,11 +90,8 @@ class Differences:
 
     def width(self, name):
         place, role = self.place(name)
-        return (
-            3e-5 * self.at[place]
-            if role == "free_mass"
-            else WIDTHS.get(name.partition(".")[0], 1e-5)
-        )
+        own = WIDTHS.get(name.partition(".")[0], 1e-5)
+        return 3e-5 * self.at[place] if role == "free_mass" else own
 
     def after(self, state, **changed):
         self.simulator.restore(state)
@@ -129,14 +126,10 @@ class Differences:
                 ends.append(self.after(state))
             columns.append((ends[0] - ends[1])[places] / ((sides[0] - sides[1]) * self.width(name)))
         for name in inputs:
-            valve = name.partition(".")[2]
-            ends = [
-                self.after(self.at, **{valve: self.null[valve] + side * COMMAND})
-                for side in self.sides
-            ]
-            columns.append(
-                (ends[0] - ends[1])[places] / ((self.sides[0] - self.sides[1]) * COMMAND)
-            )
+            valve, (up, down) = name.partition(".")[2], self.sides
+            null = self.null[valve]
+            ends = [self.after(self.at, **{valve: null + side * COMMAND}) for side in (up, down)]
+            columns.append((ends[0] - ends[1])[places] / ((up - down) * COMMAND))
         whole = np.array(columns).T
         return whole[:, : len(states)], whole[:, len(states) :]
 
@@ -150,9 +143,8 @@ class Differences:
                 state[self.place(name)[0]] += side * self.width(name)
                 self.simulator.restore(state)
                 samples.append(self.simulator.observe())
-            columns.append(
-                [(samples[0][out] - samples[1][out]) / (2.0 * self.width(name)) for out in outputs]
-            )
+            wide = 2.0 * self.width(name)
+            columns.append([(samples[0][out] - samples[1][out]) / wide for out in outputs])
         return np.array(columns).T
 
 
@@ -164,17 +156,11 @@ def agrees(rig, given, *, side="mean", held=("supply_pressure",), friction="rest
     widths = np.array([by.width(name) for name in model.states])
     # a chamber that loses air does not rest meanwhile, and one that gets some gets all of it as it
     # gets the most
-    error = (
-        1e-4
-        if any("leak" in effect["id"] or effect["id"] == "closure_flow" for effect in rig.effects)
-        else 5e-6
-    )
+    ids = [effect["id"] for effect in rig.effects]
+    error = 1e-4 if any("leak" in one or one == "closure_flow" for one in ids) else 5e-6
     found = by.sampled(model.states, model.inputs)
     # in half widths, so that every entry is seen beside what its row does
-    scales = (
-        1.0 / widths[:, None] * widths,
-        np.repeat(COMMAND / widths[:, None], len(model.inputs), axis=1),
-    )
+    scales = (widths / widths[:, None], COMMAND / widths[:, None])
     for expected, matrix, scale in zip(found, model.sampled(SAMPLE), scales, strict=True):
         difference = np.abs(matrix - expected) * scale
         assert difference.max() < error * np.abs(expected * scale).max(), (model.states, difference)
@@ -239,15 +225,10 @@ def test_a_wide_hose_behind_a_shut_valve_changes_no_slope(conductance):
 
 def test_a_muscle_without_pressure_has_the_mean_of_two_slopes():
     rig, given = settled("recruitment")
-    given = {**given, "initial": {}}
-    bare, model = (
-        linearise(rig, **given),
-        linearise(rig.with_effect("activation_pressure"), **given),
-    )
-    rate, pressure = (
-        bare.states.index(name) for name in ("joint_rate.shoulder", "muscle_pressure.pair_2")
-    )
-    assert model.a[rate, pressure] == pytest.approx(0.5 * bare.a[rate, pressure], rel=1e-6)
+    both = (rig, rig.with_effect("activation_pressure"))
+    bare, model = (linearise(one, **{**given, "initial": {}}) for one in both)
+    slope = tuple(map(bare.states.index, ("joint_rate.shoulder", "muscle_pressure.pair_2")))
+    assert model.a[slope] == pytest.approx(0.5 * bare.a[slope], rel=1e-6)
 
 
 def test_each_of_several_effects_of_one_id_is_a_state_in_the_order_given():
@@ -298,10 +279,9 @@ def test_the_core_counts_a_load_by_its_length():
 
     length = rig.tables("muscle")[""]["rest_length"]
     by_length = (force(length=length) - force(length=length - 1e-6)) / 1e-6
+    by_pressure = (force(muscle_pressure=10.0) - force(muscle_pressure=-10.0)) / 20.0
     assert a[2].tolist() == [0.0, 0.0, 0.0, 1.0]
-    assert a[3, 1] == pytest.approx(
-        -(force(muscle_pressure=10.0) - force(muscle_pressure=-10.0)) / 20.0 / mass, rel=1e-6
-    )
+    assert a[3, 1] == pytest.approx(-by_pressure / mass, rel=1e-6)
     assert a[3, 2] == pytest.approx(-by_length / mass, rel=1e-2)
     assert b[0, 0] < 0.0 < b[1, 0]
     assert c.tolist() == np.eye(4).tolist()

@@ -15,22 +15,16 @@ from pamrs.control.trajectories import step
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from tests.control.helpers import SmallPid
+from tests.control.test_linear import settle, settled
+from tests.simulation.refusals import refused
 from tests.tables import rows_of
 
 ANGLE = math.radians(45)
 #: What each moving effect adds, where the model has to show it.
 MOVING = rows_of(__file__, "moving")
 #: effects that have no linear model
-KINKED = (
-    "valve_dead_zone",
-    "valve_hysteresis",
-    "mullins_softening",
-    "parameter_drift",
-    "gauge_drift",
-    "load_cell_drift",
-    "clock_skew",
-    "sensor_lag",
-)
+KINKED = ("valve_dead_zone", "valve_hysteresis", "mullins_softening", "parameter_drift")
+KINKED += ("gauge_drift", "load_cell_drift", "clock_skew", "sensor_lag")
 
 
 @pytest.fixture(scope="module")
@@ -59,9 +53,8 @@ def test_a_lag_is_one_and_leaves_the_rest_as_it_is(rig):
     # T y' = p - y
     assert lagged.a[3] == pytest.approx([200.0, 0.0, 0.0, -200.0], rel=1e-12, abs=0.0)
     assert lagged.b[0] == pytest.approx(bare.b[0], rel=1e-12)
-    assert lagged.c[lagged.outputs.index("muscle_pressure")] == pytest.approx(
-        [0.0, 0.0, 0.0, 1.0], abs=0.0
-    )
+    read = lagged.c[lagged.outputs.index("muscle_pressure")]
+    assert read == pytest.approx([0.0, 0.0, 0.0, 1.0], abs=0.0)
     late = linearise(rig.with_effect("input_path_lag", {"time_constant": 0.02}), ANGLE)
     assert late.states[3:] == ("input_path_lag.lag",)
     assert late.a[3] == pytest.approx([0.0, 0.0, 0.0, -50.0], rel=1e-12, abs=0.0)
@@ -90,19 +83,14 @@ def test_a_relay_of_the_supply_matters_only_where_the_supply_moves(rig):
 
 
 def test_play_and_dead_zone_of_no_width_and_lags_of_no_time_are_none(rig):
-    same = rig
-    for effect, values in {
-        "valve_dead_zone": {"half_width": 0.0},
-        "valve_hysteresis": {"half_width": 0.0},
-        "input_path_lag": {"time_constant": 0.0, "delay": 0.0},
-        "pressure_lag": {"time_constant": 0.0},
-    }.items():
-        same = same.with_effect(effect, values)
+    same = rig.with_effect("input_path_lag", {"time_constant": 0.0, "delay": 0.0})
+    same = same.with_effect("pressure_lag", {"time_constant": 0.0})
+    for play in ("valve_dead_zone", "valve_hysteresis"):
+        same = same.with_effect(play, {"half_width": 0.0})
     bare, model = linearise(rig, ANGLE), linearise(same, ANGLE)
     assert model.states == bare.states
-    assert model.a == pytest.approx(bare.a, rel=1e-9, abs=1e-9)
-    assert model.b == pytest.approx(bare.b, rel=1e-9, abs=1e-9)
-    assert model.c == pytest.approx(bare.c, abs=0.0)
+    for name in "abc":
+        assert getattr(model, name) == pytest.approx(getattr(bare, name), rel=1e-9, abs=1e-9)
 
 
 def test_every_effect_is_known_and_all_together_too(rig):
@@ -113,9 +101,8 @@ def test_every_effect_is_known_and_all_together_too(rig):
             every = every.with_effect(effect)
     model = linearise(every, ANGLE)
     assert np.linalg.eigvals(model.a).real.max() < 1.0
-    assert {"payload_swing.rate", "base_flexibility.angle", "muscle_creep", "pressure_lag"} < set(
-        model.states
-    )
+    some = {"payload_swing.rate", "base_flexibility.angle", "muscle_creep", "pressure_lag"}
+    assert some < set(model.states)
 
 
 def test_a_command_that_moves_nothing_is_refused(rig):
@@ -133,20 +120,11 @@ def test_zeros_of_sensors_move_no_operating_point(rig):
     assert read.point["muscle_pressure"] == pytest.approx(true.point["muscle_pressure"] + 700.0)
 
 
-@pytest.fixture(scope="module")
-def two_joints():
-    rig, start = pamrs.rigs.named("two_joint_arm"), {}
-    for _ in range(60):
-        for joint, angle in (("elbow", 0.8), ("wrist", 0.6)):
-            start = equilibrium(rig, angle, joint=joint, chamber=joint, initial=start)
-    return rig, start
-
-
-def test_of_several_joints_each_has_to_rest(two_joints):
-    rig, start = two_joints
+def test_of_several_joints_each_has_to_rest():
+    rig, given = settled("two_joint_arm")
     with pytest.raises(ParameterError, match=r"joint_rate\.wrist.*does not rest"):
-        linearise(rig, 0.8, joint="elbow", chamber="elbow")
-    model = linearise(rig, 0.8, joint="elbow", chamber="elbow", initial=start, side="fill")
+        linearise(rig, **given)
+    model = linearise(rig, **settle(rig, given), side="fill")
     assert np.linalg.eigvals(model.a).real.max() < 1e-3
     assert model.inputs == ("valve_command.elbow", "valve_command.wrist")
 
@@ -170,12 +148,8 @@ def test_dry_friction_at_rest_and_in_motion_have_regions_of_their_own(rig):
     # both it forgets any
     start = equilibrium(rig, ANGLE)
     for kp, push, swings in ((7.0, 0.1, False), (7.0, 0.3, True), (0.4, 0.3, False)):
-        run = closed_loop(
-            rig,
-            made(kp),
-            step(ANGLE, ANGLE, duration=12.0),
-            initial={**start, "joint_angle": ANGLE + push},
-        )
+        aside = {**start, "joint_angle": ANGLE + push}
+        run = closed_loop(rig, made(kp), step(ANGLE, ANGLE, duration=12.0), initial=aside)
         late = np.ptp(run.angle[run.time > 9.0])
         assert (late > 1.0) == swings, (kp, push, late)
         assert (late < 0.1) != swings, (kp, push, late)
@@ -190,36 +164,14 @@ class DeadBand(SmallPid):
 
 
 def test_a_corner_of_a_controller_is_refused_or_a_side_is_chosen(rig):
-    point = linearise(rig, ANGLE).point
-    with pytest.raises(ParameterError, match=r"corner.*command over joint_angle"):
-        linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.01)
-    slopes = {
-        side: linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.01 + 1e-12, side=side).d[0, 0]
-        for side in ("down", "mean")
-    }
-    assert slopes["down"] == pytest.approx(-2.0, rel=1e-4)
-    assert slopes["mean"] == pytest.approx(-1.0, rel=1e-4)
-    assert linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.02).d[0, 0] == pytest.approx(-2.0)
-    with pytest.raises(ParameterError, match="at a limit"):
-        linear_controller(DeadBand(kp=2.0), point)
-    # a loop whose valve is at its end has a slope to one side only
-    with pytest.raises(ParameterError, match="corner"):
-        linear_controller(SmallPid(kp=2.0, ki=0.0), point, ANGLE + 2.5)
-
-
-@pytest.mark.parametrize(
-    ("call", "word"),
-    [
-        (lambda rig: linearise(rig, ANGLE, friction="none"), "friction"),
-        (
-            lambda rig: stable_region(
-                rig, SmallPid, {"kp": [1.0]}, payloads=[1.0], angle=ANGLE, friction=""
-            ),
-            "friction",
-        ),
-        (lambda rig: linear_controller(PID(1.0), {"joint_angle": 0.5}, side="left"), "side"),
-    ],
-)
-def test_bad_input_is_named(rig, call, word):
-    with pytest.raises(ParameterError, match=word):
-        call(rig)
+    point, law = linearise(rig, ANGLE).point, DeadBand(kp=2.0)
+    for side, slope in (("down", -2.0), ("mean", -1.0)):
+        found = linear_controller(law, point, ANGLE + 0.01 + 1e-12, side=side).d[0, 0]
+        assert found == pytest.approx(slope, rel=1e-4)
+    assert linear_controller(law, point, ANGLE + 0.02).d[0, 0] == pytest.approx(-2.0)
+    one_side = SmallPid(kp=2.0, ki=0.0)  # of a valve that is at its end
+    refused(
+        (r"corner.*command over joint_angle", lambda: linear_controller(law, point, ANGLE + 0.01)),
+        ("at a limit", lambda: linear_controller(law, point)),
+        ("corner", lambda: linear_controller(one_side, point, ANGLE + 2.5)),
+    )

@@ -31,7 +31,8 @@ from pamrs.control.stability import (
 )
 from pamrs.control.trajectories import step
 from pamrs.errors import ParameterError
-from tests.control.helpers import CONDUCTANCE, SmallPid, with_regulator
+from tests.control.helpers import CONDUCTANCE, SmallPid, with_regulator, without_friction
+from tests.simulation.refusals import refused
 
 PERIOD = 0.005
 ELBOW = math.radians(45.0)
@@ -42,16 +43,8 @@ def even_valves(name, angle, **options):
     """A packaged rig without dry friction whose valves have, at the pressures that hold it, the
     same slope where they fill as where they vent: a small motion then has one linear model.
     """
-    rig = pamrs.rigs.named(name)
-    model = rig.model
-    for table in model["muscle"].values():
-        table |= dict.fromkeys(
-            ("friction_coefficient", "friction_pressure_slope", "friction_floor"), 0.0
-        )
-    for table in [model["arm"]] if model["link"] is None else model["link"].values():
-        table["coulomb"] = 0.0
-    smooth = pamrs.Rig(rig.name, model)
-    start = RigController(RigModel(smooth), law_of(RigModel(smooth)), **options).holding(angle)
+    smooth = without_friction(name)
+    start = controller_of(smooth, options).holding(angle)
     gas, model = smooth.model["gas"], smooth.model
     ambient = gas["ambient_pressure"]
     supply = smooth.tables("supply")[""]["initial_pressure"] + ambient
@@ -63,18 +56,19 @@ def even_valves(name, angle, **options):
         ratio = chamber["alpha_in"] * supply / (chamber["alpha_out"] * pressure)
         table |= {"flow": "iso_6358", "fill_critical_ratio": 0.85, "vent_critical_ratio": 0.85}
         table |= {"fill_conductance": CONDUCTANCE, "vent_conductance": CONDUCTANCE * ratio}
-    return pamrs.Rig(rig.name, model)
+    return pamrs.Rig(name, model)
 
 
-def law_of(model, **changes):
-    return model.law(
-        "sliding",
-        **{"slope": 8.0, "switching": 4e3, "boundary_layer": 2.0, "period": PERIOD, **changes},
-    )
+def controller_of(rig, options, **changes):
+    model, gains = RigModel(rig), {"slope": 8.0, "switching": 4e3, "boundary_layer": 2.0}
+    law = model.law("sliding", **{**gains, "period": PERIOD, **changes})
+    return RigController(model, law, **options)
 
 
-def controller_of(rig, options):
-    return RigController(RigModel(rig), law_of(RigModel(rig)), **options)
+def at_rest(rig, start, **held):
+    """Half a second from a start, the valves shut unless another input is held."""
+    commands = held or {"valve_command": {name: np.full(501, 5.0) for name in rig.tables("valve")}}
+    return pamrs.simulate(rig, **commands, sample_time=0.001, initial=start)
 
 
 CASES = {
@@ -95,26 +89,16 @@ def held(request):
 
 
 def resting(angle, joints):
-    if len(joints) == 1:
-        return step(float(angle), float(angle), duration=1.0)
-    return {
-        name: step(float(one), float(one), duration=1.0)
-        for name, one in zip(joints, angle, strict=True)
-    }
+    angles = zip(joints, np.atleast_1d(angle).tolist(), strict=True)
+    return {name: step(one, one, duration=1.0) for name, one in angles}
 
 
 def test_what_holds_a_rig_holds_it(held):
     rig, controller, start, model, linear, angle = held
-    valves = list(rig.tables("valve"))
-    run = pamrs.simulate(
-        rig,
-        {name: np.full(501, 5.0) for name in valves},
-        sample_time=0.001,
-        initial=start,
-    )
+    run = at_rest(rig, start)
     for name, wanted in zip(controller.tracked, np.atleast_1d(angle), strict=True):
         assert np.abs(run[name] - wanted).max() < 1e-6
-    assert linear.outputs == tuple(f"valve_command.{name}" for name in valves)
+    assert linear.outputs == tuple(f"valve_command.{name}" for name in rig.tables("valve"))
     assert linear.command == pytest.approx(dict.fromkeys(linear.outputs, 5.0), abs=1e-5)
     assert model.inputs == linear.outputs
     assert set(linear.inputs) <= set(model.outputs)
@@ -128,17 +112,9 @@ def test_the_nonlinear_loop_moves_as_the_linear_one(held):
     controller.reset()
     for k in range(3):
         controller.update(k * PERIOD, model.point, Reference(angle))
-    run = closed_loop(
-        rig,
-        controller,
-        aim,
-        0.5,
-        initial={**start, pushed: start[pushed] + aside},
-        sample_time=PERIOD,
-        step=1e-4,
-        start=3 * PERIOD,
-        reset=False,
-    )
+    from_there = {**start, pushed: start[pushed] + aside}
+    on = {"sample_time": PERIOD, "step": 1e-4, "start": 3 * PERIOD, "reset": False}
+    run = closed_loop(rig, controller, aim, 0.5, initial=from_there, **on)
     matrix = loop_matrix(model, linear)
     x = np.zeros((run.time.size, matrix.shape[0]))
     x[0, model.states.index(pushed)] = aside
@@ -227,12 +203,7 @@ def test_a_regulated_rig_has_its_set_pressure_as_input():
     assert margins(model, linear).stable
     # what is driven moves as the simulation does
     step_of = 50.0  # so that the flow stays in the straight piece of its law
-    run = pamrs.simulate(
-        rig,
-        supply_command=np.full(201, start["supply_pressure"] + step_of),
-        sample_time=0.001,
-        initial=start,
-    )
+    run = at_rest(rig, start, supply_command=np.full(201, start["supply_pressure"] + step_of))
     phi, gamma = model.sampled(0.001)
     x = np.zeros((201, len(model.states)))
     for k in range(200):
@@ -255,24 +226,17 @@ def test_a_regulator_in_front_of_a_valve_is_held(name):
 
 
 def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
-    rig = even_valves("antagonistic_joint", ELBOW, stiffness=18.0)
+    options = {"stiffness": 18.0}
+    rig = even_valves("antagonistic_joint", ELBOW, **options)
 
     def hold(loaded):
-        return controller_of(loaded, {"stiffness": 18.0}).holding(ELBOW)
+        return controller_of(loaded, options).holding(ELBOW)
 
     def made(switching):
-        return RigController(
-            RigModel(rig), law_of(RigModel(rig), switching=switching), stiffness=18.0
-        )
+        return controller_of(rig, options, switching=switching)
 
-    region = stable_region(
-        rig,
-        made,
-        {"switching": [4e3, 4e6]},
-        payloads=[rig.model["arm"]["payload"]],
-        hold=hold,
-        delay=0.005,
-    )
+    payloads, axes = [rig.model["arm"]["payload"]], {"switching": [4e3, 4e6]}
+    region = stable_region(rig, made, axes, payloads=payloads, hold=hold, delay=0.005)
     model = linearise(rig, initial=hold(rig), side="fill")
     alone = spectral_radius(model, linear_controller(made(4e6), model.point), delay=0.005)
     assert region.radius[0, 1] >= alone > 1.0
@@ -281,16 +245,9 @@ def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
 
 def recruited(rig, share=Recruitment):
     known = RigModel(rig)
-    return RigController(
-        known,
-        known.law("sliding", period=PERIOD),
-        shares=share(
-            known.torques_of("shoulder"),
-            known.pressure_limit,
-            period=PERIOD,
-            reach=math.radians(60.0),
-        ),
-    )
+    groups, options = known.torques_of("shoulder"), {"period": PERIOD, "reach": math.radians(60.0)}
+    shares = share(groups, known.pressure_limit, **options)
+    return RigController(known, known.law("sliding", period=PERIOD), shares=shares)
 
 
 @pytest.mark.parametrize("degrees", range(20, 120, 12))
@@ -302,21 +259,14 @@ def test_what_a_share_of_groups_asks_for_holds_too(degrees):
     start = controller.holding(angle)
     assert controller.state == before
     assert start["muscle_pressure.pair_2"] == start["muscle_pressure.pair_3"] == 0.0
-    run = pamrs.simulate(
-        rig,
-        {name: np.full(501, 5.0) for name in rig.tables("valve")},
-        sample_time=0.001,
-        initial=start,
-    )
-    assert np.abs(run["joint_angle.shoulder"] - angle).max() < 1e-7
+    assert np.abs(at_rest(rig, start)["joint_angle.shoulder"] - angle).max() < 1e-7
     linearise(rig, initial=start)
     # one pair holds the arm and what the others push, 3.5 N for each muscle at its lever
-    c1, c2 = RigModel(rig).torques_of("shoulder")[0].at(angle)
+    model, joint = RigModel(rig), pamrs.Joint.from_model(rig.tables("joint")["shoulder"])
+    c1, c2 = model.torques_of("shoulder")[0].at(angle)
     asked = c1 * start["muscle_pressure.pair_1"] + c2
-    pushed = (
-        4.0 * 3.5 * float(pamrs.Joint.from_model(rig.tables("joint")["shoulder"]).torque_arm(angle))
-    )
-    assert asked - RigModel(rig).arm.weight * math.sin(angle) == pytest.approx(pushed, rel=0.01)
+    pushed = 4.0 * 3.5 * float(joint.torque_arm(angle))
+    assert asked - model.arm.weight * math.sin(angle) == pytest.approx(pushed, rel=0.01)
 
 
 def test_a_regulator_and_a_pressure_that_is_prescribed_hold_too():
@@ -324,11 +274,9 @@ def test_a_regulator_and_a_pressure_that_is_prescribed_hold_too():
     model = pamrs.rigs.shoulder().model
     del model["valve"], model["supply"]
     prescribed = RigModel(pamrs.Rig("prescribed", model), pressure_limit=1e6)
-    for known in (regulated, prescribed):
+    for known, name in ((regulated, "supply_command"), (prescribed, "pressure")):
         start = RigController(known, known.law("sliding", period=PERIOD)).holding(ELBOW)
-        held = np.full(501, start["muscle_pressure"])
-        name = "supply_command" if known is regulated else "pressure"
-        run = pamrs.simulate(known.rig, **{name: held}, sample_time=0.001, initial=start)
+        run = at_rest(known.rig, start, **{name: np.full(501, start["muscle_pressure"])})
         assert np.abs(run["joint_angle"] - ELBOW).max() < 1e-6
 
 
@@ -383,23 +331,23 @@ def test_commands_are_taken_by_their_names():
 
 def test_what_cannot_be_is_named(held):
     rig, controller, start, model, linear, angle = held
-    with pytest.raises(ParameterError, match="margins_of_each"):
-        margins(model, linear)
-    with pytest.raises(ParameterError, match="command = 'valve_command.other'"):
-        margins(model, linear, command="valve_command.other")
-    with pytest.raises(ParameterError, match="one without a name"):
-        loop_matrix(model, linear_controller(PID(1.0), {"joint_angle": 0.5}))
-    with pytest.raises(ParameterError, match="angle is missing"):
-        linearise(rig)
-    with pytest.raises(ParameterError, match="does not rest"):
-        linearise(rig, initial={**start, controller.tracked[0]: start[controller.tracked[0]] + 0.1})
-    with pytest.raises(ParameterError, match=r"point has no joint_angle\."):
-        linear_controller(controller, {"joint_angle": 0.5})
-    with pytest.raises(ParameterError, match=r"angle = .* one number each is needed, joint_angle"):
-        controller.holding(np.zeros(len(controller.joints)) - 3.0)
-    heavy = {
-        name: 500.0 for name in rig.parameters if name.rpartition(".")[2] in ("payload", "mass")
-    }
-    loaded = RigModel(rig.with_parameters(heavy))
-    with pytest.raises(ParameterError, match=r"no pressures hold joint_angle\."):
-        RigController(loaded, law_of(loaded)).holding(angle)
+    first, alone = controller.tracked[0], linear_controller(PID(1.0), {"joint_angle": 0.5})
+    aside, far = {**start, first: start[first] + 0.1}, np.zeros(len(controller.joints)) - 3.0
+    heavy = [name for name in rig.parameters if name.rpartition(".")[2] in ("payload", "mass")]
+    loaded = controller_of(rig.with_parameters(dict.fromkeys(heavy, 500.0)), {})
+    refused(
+        ("margins_of_each", lambda: margins(model, linear)),
+        (
+            "command = 'valve_command.other'",
+            lambda: margins(model, linear, command="valve_command.other"),
+        ),
+        ("one without a name", lambda: loop_matrix(model, alone)),
+        ("angle is missing", lambda: linearise(rig)),
+        ("does not rest", lambda: linearise(rig, initial=aside)),
+        (
+            r"point has no joint_angle\.",
+            lambda: linear_controller(controller, {"joint_angle": 0.5}),
+        ),
+        (r"angle = .* one number each is needed, joint_angle", lambda: controller.holding(far)),
+        (r"no pressures hold joint_angle\.", lambda: loaded.holding(angle)),
+    )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pamrs.control import trajectories as tr
-from pamrs.errors import ParameterError
+from tests.simulation.refusals import refused
 
 DEG = math.pi / 180.0
 
@@ -59,12 +59,9 @@ def test_lift_hold_return_is_the_printed_one():
     trajectory = tr.lift_hold_return(*tr.degrees(15, 60))
     angle = trajectory(np.array([0.0, 2.5, 5.0, 9.9, 12.5, 15.0, 24.0])).angle / DEG
     assert angle == pytest.approx([15.0, 37.5, 60.0, 60.0, 37.5, 15.0, 15.0])
-    assert trajectory.phases == {
-        "lift": (0.0, 5.0),
-        "hold": (5.0, 10.0),
-        "return": (10.0, 15.0),
-        "rest": (15.0, 25.0),
-    }
+    names, ends = ("lift", "hold", "return", "rest"), (0.0, 5.0, 10.0, 15.0, 25.0)
+    parts = zip(ends[:-1], ends[1:], strict=True)
+    assert trajectory.phases == dict(zip(names, parts, strict=True))
     # at a corner the rate is that of what follows
     assert trajectory(0.0).rate == pytest.approx(9 * DEG)
     assert trajectory(5.0).rate == 0.0
@@ -76,9 +73,8 @@ def test_lift_hold_return_is_the_printed_one():
 
 def test_compound_has_the_amplitudes_and_the_triangle_of_5_24():
     trajectory = tr.compound()
-    assert trajectory(0.0).angle / DEG == pytest.approx(
-        20 + 13 + 7 + 5 + 50
-    )  # the triangle begins at its lowest value, zero
+    # the triangle begins at its lowest value, zero
+    assert trajectory(0.0).angle / DEG == pytest.approx(20 + 13 + 7 + 5 + 50)
     # without the sinusoids, a triangle between 50 and 70 deg of 0.16 Hz
     bare = tr.compound(cosines=[])
     time, reference = bare.sampled(0.001, 1.0 / 0.16)
@@ -113,27 +109,21 @@ def test_a_table_with_noise_is_smoothed():
     error = [np.std(t(inner).rate - np.cos(inner)) for t in (smooth, through)]
     assert error[0] < 0.03
     assert error[1] > 10 * error[0]
-    assert tr.from_samples(time + 100.0, noisy)(1.0) == pytest.approx(
-        through(1.0), abs=1e-9
-    )  # its own clock
+    # its own clock
+    assert tr.from_samples(time + 100.0, noisy)(1.0) == pytest.approx(through(1.0), abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("call", "word"),
-    [
-        (lambda: tr.lift_hold_return(0.2, math.nan), "high"),
-        (lambda: tr.lift_hold_return(0.2, 1.0, ramp=0.0), "ramp"),
-        (lambda: tr.lift_hold_return(0.2, 1.0, duration=14.0), "duration"),
-        (lambda: tr.step(0.0, 1.0, at=9.0), "at = 9"),
-        (lambda: tr.cosine_cycles(0.2, 1.0, cycles=0), "cycles"),
-        (lambda: tr.compound(bias=math.inf), "bias"),
-        (lambda: tr.from_samples([0, 1, 2], [0, 1, 2]), "n >= 5"),
-        (lambda: tr.from_samples([0, 1, 1, 2, 3], [0, 1, 2, 3, 4]), r"time\[2\]"),
-        (lambda: tr.from_samples(range(5), range(5), smoothing=-1.0), "smoothing"),
-        (lambda: tr.step(0.0, 1.0)(math.nan), "time"),
-        (lambda: tr.step(0.0, 1.0).sampled(0.0), "sample_time"),
-    ],
-)
-def test_bad_input_is_named(call, word):
-    with pytest.raises(ParameterError, match=word):
-        call()
+def test_bad_input_is_named():
+    refused(
+        ("high", lambda: tr.lift_hold_return(0.2, math.nan)),
+        ("ramp", lambda: tr.lift_hold_return(0.2, 1.0, ramp=0.0)),
+        ("duration", lambda: tr.lift_hold_return(0.2, 1.0, duration=14.0)),
+        ("at = 9", lambda: tr.step(0.0, 1.0, at=9.0)),
+        ("cycles", lambda: tr.cosine_cycles(0.2, 1.0, cycles=0)),
+        ("bias", lambda: tr.compound(bias=math.inf)),
+        ("n >= 5", lambda: tr.from_samples([0, 1, 2], [0, 1, 2])),
+        (r"time\[2\]", lambda: tr.from_samples([0, 1, 1, 2, 3], [0, 1, 2, 3, 4])),
+        ("smoothing", lambda: tr.from_samples(range(5), range(5), smoothing=-1.0)),
+        ("time", lambda: tr.step(0.0, 1.0)(math.nan)),
+        ("sample_time", lambda: tr.step(0.0, 1.0).sampled(0.0)),
+    )

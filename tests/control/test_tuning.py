@@ -32,34 +32,16 @@ def test_a_sweep_is_its_single_runs(rig, unit):
     kp, ki = np.array([1.0, 2.0, 1.5, 0.5]), np.array([0.5, 1.0, 0.0, 2.0])
     rigs = [rig.with_parameters({"arm.payload": m}) for m in (5.0, 9.0, 12.0, 5.0)]
     sensors = Sensors(noise={"joint_angle": 1e-4}, delay=0.01, seed=3)
-    all_of_them = sweep(
-        rigs,
-        SmallPid(kp, ki, period=0.005),
-        LIFT,
-        3.0,
-        sample_time=0.005,
-        sensors=sensors,
-        channels=["joint_angle"],
-        unit=unit,
-    )
-    assert not all_of_them.failed.any()
+    loop = {"duration": 3.0, "sample_time": 0.005, "sensors": sensors}
+    whole = sweep(rigs, SmallPid(kp, ki), LIFT, channels=["joint_angle"], unit=unit, **loop)
+    assert not whole.failed.any()
     for k in range(4):
-        one = closed_loop(
-            rigs[k],
-            SmallPid(kp[k], ki[k], period=0.005),
-            LIFT,
-            3.0,
-            sample_time=0.005,
-            sensors=sensors,
-        )
+        one = closed_loop(rigs[k], SmallPid(kp[k], ki[k]), LIFT, **loop)
         # side by side in lanes, the single ones are not: the last digits differ
-        np.testing.assert_allclose(all_of_them.run["joint_angle"][k], one.angle, rtol=1e-8)
+        np.testing.assert_allclose(whole.run["joint_angle"][k], one.angle, rtol=1e-8)
         single = one.metrics(unit=unit)
-        assert all_of_them.squared_error[k] == pytest.approx(single.squared_error, rel=1e-7)
-        assert all_of_them.curvature[k] == pytest.approx(single.curvature, rel=1e-7)
-        assert all_of_them.rms[k] == pytest.approx(single.rms, rel=1e-7)
-        assert all_of_them.largest[k] == pytest.approx(single.largest, rel=1e-7)
-        assert all_of_them.final[k] == pytest.approx(single.final, rel=1e-7)
+        for name in ("squared_error", "curvature", "rms", "largest", "final"):
+            assert getattr(whole, name)[k] == pytest.approx(getattr(single, name), rel=1e-7)
 
 
 def test_the_loops_of_a_map_run_side_by_side(rig, monkeypatch):
@@ -84,9 +66,8 @@ def test_a_map_is_a_sweep_of_every_combination(rig):
     found = gain_map(rig, pid, axes, LIFT, payloads=[2.0, 9.0], **FAST)
     assert found.j.shape == (2, 3, 2)
     for p, mass in enumerate((2.0, 9.0)):
-        run = closed_loop(
-            rig.with_parameters({"arm.payload": mass}), pid(2.0, 1.0), LIFT, 3.0, sample_time=0.01
-        ).metrics()
+        loaded = rig.with_parameters({"arm.payload": mass})
+        run = closed_loop(loaded, pid(2.0, 1.0), LIFT, **FAST).metrics()
         assert found.squared_error[p, 2, 1] == pytest.approx(run.squared_error, rel=1e-8)
         assert found.curvature[p, 2, 1] == pytest.approx(run.curvature, rel=1e-8)
     # J of the best is one only if it is best in both; each payload is a set of its own
@@ -98,11 +79,9 @@ def test_a_map_is_a_sweep_of_every_combination(rig):
         assert found.j[p] == pytest.approx(j)
         assert row["j"] == pytest.approx(j.min())
         assert found.scale[p] == pytest.approx([nu.min(), omega.min()])
-    assert (
-        found.best("rms")[0]["rms"]
-        == found.rms[0].min()
-        == pytest.approx(math.sqrt(found.squared_error[0].min() / 3.0))
-    )
+    least = found.rms[0].min()
+    assert found.best("rms")[0]["rms"] == least
+    assert least == pytest.approx(math.sqrt(found.squared_error[0].min() / 3.0))
     assert found.best("squared_error")[0]["squared_error"] == found.squared_error[0].min()
 
 
@@ -110,26 +89,20 @@ def test_a_map_is_a_sweep_of_every_combination(rig):
 def test_a_search_is_at_least_as_good_as_the_grid_and_seeded(rig, method):
     pytest.importorskip({"cma": "cma", "optuna": "optuna"}[method])
     bounds = {"kp": (0.2, 4.0), "ki": (0.0, 3.0)}
-    grid = gain_map(
-        rig, pid, {name: np.linspace(*box, 6) for name, box in bounds.items()}, LIFT, **FAST
-    )
+    axes = {name: np.linspace(*box, 6) for name, box in bounds.items()}
+    grid = gain_map(rig, pid, axes, LIFT, **FAST)
     scale = tuple(grid.scale[0])
     state = np.random.get_state()[1].copy()  # noqa: NPY002
-    found = [
-        search_gains(
-            rig, pid, bounds, LIFT, method=method, evaluations=64, seed=5, scale=scale, **FAST
-        )
-        for _ in range(2)
-    ]
+    options = {"method": method, "evaluations": 64, "seed": 5, "scale": scale}
+    found = [search_gains(rig, pid, bounds, LIFT, **options, **FAST) for _ in range(2)]
     assert (np.random.get_state()[1] == state).all()  # noqa: NPY002
     assert found[0].tried.shape == (64, 2)
     assert (found[0].tried == found[1].tried).all()
     assert found[0].j == found[1].j == found[0].values.min()
     assert found[0].j < 1.02 * grid.j.min()
-    run = closed_loop(rig, pid(**found[0].gains), LIFT, 3.0, sample_time=0.01).metrics()
-    assert found[0].j == pytest.approx(
-        0.25 * run.squared_error / scale[0] + 0.75 * run.curvature / scale[1]
-    )
+    run = closed_loop(rig, pid(**found[0].gains), LIFT, **FAST).metrics()
+    j = 0.25 * run.squared_error / scale[0] + 0.75 * run.curvature / scale[1]
+    assert found[0].j == pytest.approx(j)
 
 
 @pytest.mark.parametrize("method", ["cma", "optuna"])
@@ -142,12 +115,8 @@ def test_a_search_is_never_worse_than_its_start(rig, method, scaled):
     best = grid.best()[0]
     start = {name: best[name] for name in ("ki", "kp")}  # in any order
     more = {"evaluations": 8, "scale": tuple(grid.scale[0])} if scaled else {"evaluations": 16}
-    alone, found = (
-        search_gains(
-            rig, pid, bounds, LIFT, method=method, population=8, seed=4, start=s, **more, **FAST
-        )
-        for s in (None, start)
-    )
+    more |= {"method": method, "population": 8, "seed": 4, **FAST}
+    alone, found = (search_gains(rig, pid, bounds, LIFT, start=s, **more) for s in (None, start))
     first = 0 if scaled else 8
     assert found.tried.shape == alone.tried.shape
     assert found.tried[first].tolist() == [best["kp"], best["ki"]]
@@ -159,36 +128,19 @@ def test_a_search_is_never_worse_than_its_start(rig, method, scaled):
         assert found.j < alone.j
 
 
-def test_a_start_may_be_on_its_bounds(rig):
+def test_a_search_without_a_scale_takes_that_of_its_first_population(rig):
+    """And begins then, also on its bounds."""
     pytest.importorskip("cma")
-    start = {"kp": 4.0, "ki": 0.0}
-    found = search_gains(
-        rig,
-        pid,
-        {"kp": (0.2, 4.0), "ki": (0.0, 3.0)},
-        LIFT,
-        evaluations=16,
-        population=8,
-        start=start,
-        **FAST,
-    )
+    bounds, start = {"kp": (0.2, 4.0), "ki": (0.0, 3.0)}, {"kp": 4.0, "ki": 0.0}
+    options = {"evaluations": 24, "population": 8, "seed": 1, "start": start}
+    found = search_gains(rig, pid, bounds, LIFT, **options, **FAST)
+    assert found.scale == pytest.approx((found.squared_error[:8].min(), found.curvature[:8].min()))
+    assert found.values.size == 24
     assert found.tried[8].tolist() == [4.0, 0.0]
 
 
-def test_a_search_without_a_scale_takes_that_of_its_first_population(rig):
-    pytest.importorskip("cma")
-    found = search_gains(
-        rig,
-        pid,
-        {"kp": (0.2, 4.0), "ki": (0.0, 3.0)},
-        LIFT,
-        evaluations=24,
-        population=8,
-        seed=1,
-        **FAST,
-    )
-    assert found.scale == pytest.approx((found.squared_error[:8].min(), found.curvature[:8].min()))
-    assert found.values.size == 24
+def searched(rig, bounds=None, **options):
+    return search_gains(rig, pid, {"kp": (1.0, 2.0)} if bounds is None else bounds, LIFT, **options)
 
 
 def test_a_controller_for_another_model_controls_the_perturbed_plant(rig):
@@ -203,13 +155,9 @@ def test_a_controller_for_another_model_controls_the_perturbed_plant(rig):
 
 def test_perturbed_is_off_by_what_it_says(rig):
     plant = perturbed(rig, force=1.06, friction=0.9, inertia=1.04)
-    for name, factor in (
-        ("arm.viscous", 0.9),
-        ("arm.coulomb", 0.9),
-        ("arm.inertia", 1.04),
-        ("arm.payload", 1.0),
-    ):
-        assert plant.parameter(name).value == pytest.approx(factor * rig.parameter(name).value)
+    for name, factor in {"viscous": 0.9, "coulomb": 0.9, "inertia": 1.04, "payload": 1.0}.items():
+        found, known = (one.parameter(f"arm.{name}").value for one in (plant, rig))
+        assert found == pytest.approx(factor * known)
     # at rest length the pressure's part of the force goes with the cross-section
     pull = [float(r.muscle.force(8e5, 0.0) - r.muscle.force(0.0, 0.0)) for r in (rig, plant)]
     assert pull[1] / pull[0] == pytest.approx(1.06, rel=0.02)
@@ -232,33 +180,18 @@ def test_perturbed_is_off_by_what_it_says(rig):
         (lambda r: gain_map(r, pid, {}, LIFT), "axes"),
         (lambda r: gain_map(r, pid, {"kp": []}, LIFT), "kp"),
         (lambda r: gain_map(r, pid, {"kp": [1.0]}, LIFT, payloads=[]), "payloads"),
-        (lambda r: search_gains(r, pid, {}, LIFT), "bounds"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 1.0)}, LIFT), "kp"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, method="ga"), "method"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, evaluations=8), "population"),
-        (
-            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, evaluations=30, population=16),
-            "evaluations",
-        ),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, seed=-1), "seed"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, scale=(0.0, 1.0)), "scale"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, math.nan)}, LIFT), "kp"),
-        (
-            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": 2.5}),
-            "start of kp = 2.5 .* 1 to 2",
-        ),
-        (
-            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": math.nan}),
-            "start of kp = nan",
-        ),
-        (
-            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": "a"}),
-            "start of kp = 'a'",
-        ),
-        (
-            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"ki": 1.0}),
-            "start = .*: one value each of kp",
-        ),
+        (lambda r: searched(r, {}), "bounds"),
+        (lambda r: searched(r, {"kp": (1.0, 1.0)}), "kp"),
+        (lambda r: searched(r, {"kp": (1.0, math.nan)}), "kp"),
+        (lambda r: searched(r, method="ga"), "method"),
+        (lambda r: searched(r, evaluations=8), "population"),
+        (lambda r: searched(r, evaluations=30, population=16), "evaluations"),
+        (lambda r: searched(r, seed=-1), "seed"),
+        (lambda r: searched(r, scale=(0.0, 1.0)), "scale"),
+        (lambda r: searched(r, start={"kp": 2.5}), "start of kp = 2.5 .* 1 to 2"),
+        (lambda r: searched(r, start={"kp": math.nan}), "start of kp = nan"),
+        (lambda r: searched(r, start={"kp": "a"}), "start of kp = 'a'"),
+        (lambda r: searched(r, start={"ki": 1.0}), "start = .*: one value each of kp"),
     ],
 )
 def test_bad_input_is_named(rig, call, word):

@@ -1,16 +1,15 @@
 """Joint design: the objective, the searches, the outer loop, the front, the published joints."""
 
+import itertools
 import math
 import random
-import subprocess
-import sys
 import tomllib
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from pamrs import Joint, Muscle, ParameterError, library
+from pamrs import Joint, ParameterError, library
 from pamrs.design import (
     LENGTHS,
     METHODS,
@@ -26,6 +25,8 @@ from pamrs.design import (
 from pamrs.design._genetic import redraw_one
 from pamrs.design._problem import _areas
 from reproduction.joints import CASES, facts_of_geometry
+from tests.scripts import script
+from tests.simulation.refusals import refused
 from tests.tables import rows_of
 
 INCH = 0.0254
@@ -50,8 +51,19 @@ def ball(points):
     return 1.0 + np.sum((points - np.array([0.3, 0.7, 0.3, 0.7])) ** 2, axis=1)
 
 
-def run(method, seed=0, **options):
-    return search(ball, np.zeros(4), np.ones(4), method=method, seed=seed, **options)
+def run(method="ga", seed=0, law=ball, genes=4, **options):
+    return search(law, np.zeros(genes), np.ones(genes), method=method, seed=seed, **options)
+
+
+def noted(law):
+    """A law, and the batches of points that it is asked for."""
+    batches = []
+
+    def asked(points):
+        batches.append(points.copy())
+        return law(points)
+
+    return asked, batches
 
 
 # --------------------------------------------------------------------- objective
@@ -132,14 +144,8 @@ def test_designs_out_of_reach_are_penalised_and_finite():
         [short, [0.0127, 0.0635, 0.0127, 0.0], [0.5, 0.5, 0.5, 0.5], [0.05, 0.0, 0.05, 0.05]]
     )
     scores = task.evaluate(designs)
-    for values in (
-        scores.fitness,
-        scores.area_below,
-        scores.area_above,
-        scores.torque,
-        scores.max_angle,
-    ):
-        assert np.all(np.isfinite(values))
+    for name in ("fitness", "area_below", "area_above", "torque", "max_angle"):
+        assert np.all(np.isfinite(getattr(scores, name))), name
     assert np.all(scores.fitness >= 1e4)
     assert not np.any(scores.available)
     assert np.all(task.needed_pressure(designs) >= 1e10)
@@ -184,13 +190,8 @@ def test_met_within_a_tolerance_is_not_called_met():
     )
     assert words in low.summary()
     assert "the requirement is met" not in low.summary()
-    found = low.to_dict()
-    assert [found[name] for name in ("met", "area_tolerance", "shortfall", "shortfall_angle")] == [
-        True,
-        1e-3,
-        short,
-        angle,
-    ]
+    told = {"met": True, "area_tolerance": 1e-3, "shortfall": short, "shortfall_angle": angle}
+    assert told.items() <= low.to_dict().items()
     enough = JointDesign.of(task.replace(pressure=needed), GOOD)
     assert enough.shortfall[0] == 0.0
     assert "the requirement is met" in enough.summary()
@@ -232,13 +233,9 @@ def test_the_published_joint_law_gives_less_torque():
     assert np.all(problem(kind="published").evaluate(GOOD).torque < problem().evaluate(GOOD).torque)
 
 
-@pytest.mark.parametrize(
-    ("changes", "word"),
-    rows_of(__file__, "impossible_problems_are_named"),
-)
-def test_impossible_problems_are_named(changes, word):
-    with pytest.raises(ParameterError, match=word):
-        problem(**changes)
+def test_impossible_problems_are_named():
+    for changes, word in rows_of(__file__, "impossible_problems_are_named"):
+        refused((word, lambda changes=changes: problem(**changes)))
 
 
 @pytest.mark.parametrize(
@@ -265,13 +262,8 @@ def test_mutation_changes_one_variable_only():
 
 
 def test_the_published_numbers_of_designs():
-    batches = []
-
-    def counted(points):
-        batches.append(points.copy())
-        return ball(points)
-
-    found = search(counted, np.zeros(4), np.ones(4), genetic=Genetic(tolerance=None))
+    law, batches = noted(ball)
+    found = run(law=law, genetic=Genetic(tolerance=None))
     assert [len(batch) for batch in batches] == [20] + [18] * 100
     assert found.evaluations == 1820
     assert found.history.evaluations.tolist() == [20 + 18 * k for k in range(101)]
@@ -290,17 +282,12 @@ def single_cut(point, first, second):
 
 @pytest.mark.parametrize("order", [1.0, -1.0])
 def test_every_child_comes_from_the_two_best_of_elites_and_children(order):
-    batches = []
-
-    def by_order(points):  # later ones are worse, or better
-        batches.append(points.copy())
-        done = sum(map(len, batches))
-        return order * np.arange(done - len(points), done, dtype=float)
-
-    settings = Genetic(
-        mutation=0.0, tolerance=None, bits=1
-    )  # one digit a coordinate: cuts can be seen
-    search(by_order, np.zeros(24), np.ones(24), evaluations=20 + 18 * 8, genetic=settings)
+    numbers = itertools.count()
+    # later ones are worse, or better
+    law, batches = noted(lambda points: np.array([order * next(numbers) for _ in points]))
+    # one digit a coordinate: cuts can be seen
+    settings = Genetic(mutation=0.0, tolerance=None, bits=1)
+    run(law=law, genes=24, evaluations=20 + 18 * 8, genetic=settings)
     for before, batch in zip(batches[:-1], batches[1:], strict=True):
         elites = batches[0][:2] if order > 0.0 else before[-2:]
         assert all(single_cut(point, *elites) for point in batch)
@@ -323,21 +310,10 @@ def test_a_search_repeats_by_its_seed_and_never_loses_the_best(method):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("evaluations", [20, 333, 1000])
 def test_every_method_makes_exactly_the_evaluations_it_may(method, evaluations):
-    calls = []
-
-    def counted(points):
-        calls.append(len(points))
-        return ball(points)
-
-    found = search(
-        counted,
-        np.zeros(4),
-        np.ones(4),
-        method=method,
-        evaluations=evaluations,
-        genetic=Genetic(tolerance=None),
-    )
-    assert sum(calls) == found.evaluations == found.history.evaluations[-1] == evaluations
+    law, batches = noted(ball)
+    found = run(method, law=law, evaluations=evaluations, genetic=Genetic(tolerance=None))
+    made = sum(map(len, batches))
+    assert made == found.evaluations == found.history.evaluations[-1] == evaluations
 
 
 @pytest.mark.parametrize(
@@ -356,48 +332,23 @@ def test_the_genetic_algorithm_stops_when_it_has_converged():
     assert found.history.best[-11] - found.history.best[-1] <= 1e-6 * found.history.best[-11]
 
 
-@pytest.mark.parametrize(
-    ("options", "word"),
-    [
-        ({"method": "newton"}, "method"),
-        ({"evaluations": 19}, "evaluations"),
-        ({"seed": -1}, "seed"),
-    ],
-)
-def test_impossible_searches_are_named(options, word):
-    with pytest.raises(ParameterError, match=word):
-        search(ball, np.zeros(4), np.ones(4), **options)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"elites": 1},
-        {"population": 2},
-        {"bits": 0},
-        {"mutation": 1.5},
-        {"stall": 0},
-        {"tolerance": -1.0},
-    ],
-)
-def test_impossible_settings_are_named(options):
-    with pytest.raises(ParameterError, match=next(iter(options))):
-        Genetic(**options)
+def test_impossible_searches_and_settings_are_named():
+    searches = {"method": "newton", "evaluations": 19, "seed": -1}
+    settings = {"elites": 1, "population": 2, "bits": 0}
+    settings |= {"mutation": 1.5, "stall": 0, "tolerance": -1.0}
+    for call, options in ((run, searches), (Genetic, settings)):
+        for name, value in options.items():
+            with pytest.raises(ParameterError, match=name):
+                call(**{name: value})
 
 
 def test_a_long_tendon_on_a_constant_force_is_a_pulley():
     # muscle ends far away, force nearly constant over a short range: torque = F (arm), arm is about
     # the lower link's lever
-    task = problem(
-        min_angle=math.radians(80.0), max_angle=math.radians(84.0), torque=400.0, points=11
-    )
-    far = {
-        "upper_axial": (2.0, 2.0),
-        "upper_offset": (0.0, 0.0),
-        "lower_offset": (0.0, 0.0),
-        "lower_axial": (0.001, 0.05),
-    }
-    task = task.replace(bounds=far)
+    far = {"upper_axial": (2.0, 2.0), "lower_axial": (0.001, 0.05)}
+    far |= {"upper_offset": (0.0, 0.0), "lower_offset": (0.0, 0.0)}
+    angles = {"min_angle": math.radians(80.0), "max_angle": math.radians(84.0)}
+    task = problem(**angles, torque=400.0, points=11, bounds=far)
     found = optimise(task, "de", evaluations=300)
     lever = task.torque / (6.0 * float(task.muscle.force(task.pressure, 0.0)))
     assert found.lengths[2] == pytest.approx(lever, rel=0.03)
@@ -440,13 +391,11 @@ def test_the_tolerance_of_the_outer_loop_is_kept_and_its_bound_holds():
 
 def test_more_torque_needs_more_pressure():
     options = {"tries": 1, "evaluations": 400, "tolerance": 2e4}
-    pressures = [
-        minimum_pressure(problem(points=22, torque=t), "de", **options).pressure
-        for t in (600.0, 900.0, 1200.0)
-    ]
+    tasks = [problem(points=22, torque=torque) for torque in (600.0, 900.0, 1200.0)]
+    pressures = [minimum_pressure(task, "de", **options).pressure for task in tasks]
     assert pressures[0] < pressures[1] < pressures[2]
-    bounds = [problem(torque=t).least_possible_pressure() for t in (600.0, 900.0, 1200.0)]
-    assert all(low < high for low, high in zip(bounds, pressures, strict=True))
+    for task, pressure in zip(tasks, pressures, strict=True):
+        assert task.least_possible_pressure() < pressure
 
 
 def test_an_impossible_requirement_says_so():
@@ -471,13 +420,10 @@ def test_bounds_that_cannot_reach_the_range_give_a_result_too():
     assert len(pareto_front(task, population=8, generations=2).size) == 0
 
 
-@pytest.mark.parametrize(
-    ("options", "word"),
-    [({"tolerance": 0.0}, "tolerance"), ({"tries": 0}, "tries"), ({"highest": -1.0}, "highest")],
-)
-def test_impossible_outer_loops_are_named(options, word):
-    with pytest.raises(ParameterError, match=word):
-        minimum_pressure(problem(), **options)
+def test_impossible_outer_loops_are_named():
+    for name, value in {"tolerance": 0.0, "tries": 0, "highest": -1.0}.items():
+        with pytest.raises(ParameterError, match=name):
+            minimum_pressure(problem(), **{name: value})
 
 
 def test_no_design_of_the_front_beats_another_and_none_is_far_from_the_best():
@@ -520,11 +466,8 @@ def test_published_joints_beside_ours():
     assert shoulder["least torque of Table 3.5"].ours == pytest.approx(350.0, abs=2.0)
     assert shoulder["the same, braid's force alone, 75.4 deg (ch. 5: N 0.9)"].verdict == "agree"
     assert "against itself" in shoulder["torque at 13 bar and 90 deg"].note
-    assert {row.verdict for row in (*shoulder.values(), *elbow.values())} == {
-        "agree",
-        "differs",
-        "cannot tell",
-    }
+    verdicts = {row.verdict for row in (*shoulder.values(), *elbow.values())}
+    assert verdicts == {"agree", "differs", "cannot tell"}
 
 
 def test_a_design_round_trips_as_a_joint():
@@ -543,16 +486,9 @@ def test_friction_plays_no_part():
     )
     values = [problem(muscle=item, points=22).evaluate(GOOD).fitness[0] for item in (muscle, plain)]
     assert values[0] == values[1]
-    assert isinstance(plain, Muscle)
 
 
 def test_the_package_is_light():
-    heavy = ("deap", "cma", "scipy", "matplotlib")
-    code = (
-        f"import sys, pamrs.design, pamrs.cli.design; print([name for name in {heavy} if name in "
-        "sys.modules])"
-    )
-    shown = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout
-    assert shown.strip() == "[]"
+    heavy = {"deap", "cma", "scipy", "matplotlib"}
+    begin = "import sys, pamrs.design, pamrs.cli.design; "
+    assert script(f"{begin}print(*({heavy} & set(sys.modules)))") == []

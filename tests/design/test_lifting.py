@@ -10,9 +10,9 @@ import pytest
 import pamrs
 from pamrs import rigs
 from pamrs.design import lift
-from pamrs.errors import ParameterError
 from pamrs.rig import Joint, Rig
 from tests.scripts import command
+from tests.simulation.refusals import refused
 from tests.tables import rows_of
 
 PSI, LB = 6894.757293168361, 0.45359237
@@ -43,13 +43,11 @@ def rest_angle(rig, pressure, *, start=None, seconds=40.0):
     arm damped until nothing moves.
     """
     fed = changed(rig, supply=None, valve=None, arm={"viscous": 150.0})
-    time = np.arange(0.0, seconds, 0.02)
-    given = (
-        np.full(time.size, pressure)
-        if start is not None
-        else pressure * np.minimum(time / (0.5 * seconds), 1.0)
-    )
-    initial = {} if start is None else {"joint_angle": start}
+    given = np.full(round(seconds / 0.02), pressure)
+    initial = {"joint_angle": start}
+    if start is None:
+        given *= np.minimum(np.arange(given.size) * 0.02 / (0.5 * seconds), 1.0)
+        initial = {}
     result = pamrs.simulate(fed, pressure=given, sample_time=0.02, initial=initial)
     assert abs(float(result["joint_rate"][-1])) < 1e-5, "it has not come to rest"
     return float(result["joint_angle"][-1])
@@ -86,9 +84,7 @@ def test_the_angle_reached_is_where_the_torques_meet(elbow):
 def test_capacity_is_the_payload_that_reaches_an_angle(elbow):
     light = lift(elbow, pressure=FULL, points=200)
     for row in (20, 100, 190):
-        again = lift(
-            elbow.with_parameters({"arm.payload": float(light.capacity[row])}), pressure=FULL
-        )
+        again = lift(changed(elbow, arm={"payload": float(light.capacity[row])}), pressure=FULL)
         assert again.reached == pytest.approx(float(light.angle[row]), abs=1e-9)
 
 
@@ -96,26 +92,17 @@ def test_capacity_is_the_payload_that_reaches_an_angle(elbow):
 def test_payload_limit_is_just_lifted(elbow, degrees):
     to = elbow.model["joint"]["max_angle"] if degrees == 120.0 else math.radians(degrees)
     limit = lift(elbow, pressure=FULL, to=to).payload_limit
-    verdicts = [
-        lift(elbow.with_parameters({"arm.payload": f * limit}), pressure=FULL, to=to).can_lift
-        for f in (0.9999, 1.0001)
-    ]
-    assert verdicts == [True, False]
+    less, more = (changed(elbow, arm={"payload": f * limit}) for f in (0.9999, 1.0001))
+    assert lift(less, pressure=FULL, to=to).can_lift
+    assert not lift(more, pressure=FULL, to=to).can_lift
 
 
 def test_the_limit_inside_the_range_is_found_between_the_points(elbow):
     # a cam whose lever is shortest in the middle of the range
-    level = {
-        "kind": "polynomial",
-        "coefficients": [0.03, -0.03, 0.0167],
-        "rest_angle": 0.3,
-        "min_angle": 0.3,
-        "max_angle": 1.9,
-    }
+    level = {"kind": "polynomial", "coefficients": [0.03, -0.03, 0.0167]}
+    level |= {"rest_angle": 0.3, "min_angle": 0.3, "max_angle": 1.9}
     kept = {name: elbow.model["joint"][name] for name in ("stop_stiffness", "stop_damping")}
-    model = elbow.model
-    model["joint"] = {**kept, **level}
-    rig = Rig("cam", model)
+    rig = Rig("cam", elbow.model | {"joint": kept | level})
     coarse, fine = lift(rig, pressure=FULL, points=31), lift(rig, pressure=FULL, points=20001)
     assert 0.3 < fine.limit_angle < 1.9
     assert coarse.payload_limit == pytest.approx(fine.payload_limit, rel=1e-8)
@@ -127,25 +114,20 @@ def test_the_limit_inside_the_range_is_found_between_the_points(elbow):
     (first, last) = result.regained[0]
     assert result.reached < fine.limit_angle < first < last == result.angle[-1]
     assert "brought there, it goes on" in result.text
-    assert rest_angle(changed(heavy, arm={"coulomb": 0.0}), FULL) == pytest.approx(
-        lift(changed(heavy, arm={"coulomb": 0.0}), pressure=FULL).reached, abs=2e-4
-    )
+    plain = changed(heavy, arm={"coulomb": 0.0})
+    reached = lift(plain, pressure=FULL).reached
+    assert rest_angle(plain, FULL) == pytest.approx(reached, abs=2e-4)
 
 
 def test_friction_narrows_what_is_lifted_and_widens_what_is_held(elbow):
-    plain, rough = (
-        lift(elbow, pressure=FULL),
-        lift(changed(elbow, arm={"coulomb": 15.0}), pressure=FULL),
-    )
+    plain = lift(elbow, pressure=FULL)
+    rough = lift(changed(elbow, arm={"coulomb": 15.0}), pressure=FULL)
     assert rough.reached < plain.reached < plain.held < rough.held
     hysteretic = lift(changed(elbow, muscle=HYSTERESIS), pressure=4e5)
-    np.testing.assert_allclose(
-        (hysteretic.torque_holding / hysteretic.torque)[:300], 1.102 / 0.898, rtol=1e-9
-    )
-    effect = elbow.with_effect(
-        "muscle_hysteresis",
-        {"friction_constant": 10.0, "friction_pressure": 2e-5, "presliding": 1e-3},
-    )
+    widened = hysteretic.torque_holding / hysteretic.torque
+    np.testing.assert_allclose(widened[:300], 1.102 / 0.898, rtol=1e-9)
+    friction = {"friction_constant": 10.0, "friction_pressure": 2e-5, "presliding": 1e-3}
+    effect = elbow.with_effect("muscle_hysteresis", friction)
     change = lift(effect, pressure=4e5).torque - lift(elbow, pressure=4e5).torque
     arm = Joint.from_model(elbow.model["joint"]).moment_arm(plain.angle)
     np.testing.assert_allclose(change, -6 * (10.0 + 8.0) * arm, rtol=1e-8, atol=1e-9)
@@ -153,23 +135,24 @@ def test_friction_narrows_what_is_lifted_and_widens_what_is_held(elbow):
 
 def test_each_muscle_has_the_friction_that_acts_on_it():
     plain = rigs.named("antagonistic_joint")
-    pressure = 2e5
 
-    def lost(*effects):
+    def lost(**constants):
         rig = plain
-        for at, constant in effects:
+        for at, constant in constants.items():
             values = {"friction_constant": constant, "friction_pressure": 0.0, "presliding": 1e-3}
-            rig = rig.with_effect("muscle_hysteresis", values, at=at)
-        return lift(plain, pressure=pressure).torque - lift(rig, pressure=pressure).torque
+            rig = rig.with_effect("muscle_hysteresis", values, at="" if at == "all" else at)
+        return lift(plain, pressure=2e5).torque - lift(rig, pressure=2e5).torque
 
-    one, other = lost(("flexor", 10.0)), lost(("extensor", 4.0))
+    one, other = lost(flexor=10.0), lost(extensor=4.0)
     assert np.abs(one).max() > 0.0
     assert np.abs(other).max() > 0.0
-    for pair in ((("flexor", 10.0), ("extensor", 4.0)), (("extensor", 4.0), ("flexor", 10.0))):
-        np.testing.assert_allclose(lost(*pair), one + other, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(
-        lost(("", 10.0)), lost(("flexor", 10.0), ("extensor", 10.0)), rtol=1e-9, atol=1e-9
-    )
+    both = lost(flexor=10.0, extensor=10.0)
+    for found, expected in (
+        (lost(flexor=10.0, extensor=4.0), one + other),
+        (lost(extensor=4.0, flexor=10.0), one + other),
+        (lost(all=10.0), both),
+    ):
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
 def test_only_what_changes_a_torque_is_left_out(elbow):
@@ -225,12 +208,9 @@ def test_simulation_with_hysteresis_rests_between_lifted_and_held(elbow):
     rig = changed(elbow, arm={"coulomb": 0.0}, muscle=HYSTERESIS)
     result = lift(rig, pressure=6e5)
     assert math.degrees(result.held - result.reached) > 4.0
-    assert rest_angle(rig, 6e5) == pytest.approx(
-        result.reached, abs=2e-4
-    )  # lifted slowly: the shortening branch
-    assert rest_angle(rig, 6e5, start=1.9) == pytest.approx(
-        result.held, abs=2e-4
-    )  # sunk from above: the other branch
+    # lifted slowly: the shortening branch; sunk from above: the other branch
+    assert rest_angle(rig, 6e5) == pytest.approx(result.reached, abs=2e-4)
+    assert rest_angle(rig, 6e5, start=1.9) == pytest.approx(result.held, abs=2e-4)
 
 
 def test_simulation_with_coulomb_friction_rests_between_lifted_and_held(elbow):
@@ -244,22 +224,17 @@ def test_simulation_with_coulomb_friction_rests_between_lifted_and_held(elbow):
 
 
 def test_bad_arguments(elbow):
-    with pytest.raises(ParameterError, match=r"rig 'sealed_chamber' has no \[muscle\]"):
-        lift(rigs.sealed_chamber())
-    for pressure in (math.nan, math.inf, -1.0):
-        with pytest.raises(ParameterError, match="pressure = "):
-            lift(elbow, pressure=pressure)
-    with pytest.raises(
-        ParameterError, match=r"pressure is missing: the rig 'elbow' has no \[supply\]"
-    ):
-        lift(changed(elbow, supply=None, valve=None))
-    for to in (0.1, 3.0, math.nan):
-        with pytest.raises(
-            ParameterError, match=r"to = .* rad .* at most joint.max_angle = 120.0 deg"
-        ):
-            lift(elbow, to=to)
-    with pytest.raises(ParameterError, match="points = 2"):
-        lift(elbow, points=2)
+    no_supply = changed(elbow, supply=None, valve=None)
+    refused(
+        (r"rig 'sealed_chamber' has no \[muscle\]", lambda: lift(rigs.sealed_chamber())),
+        (r"pressure is missing: the rig 'elbow' has no \[supply\]", lambda: lift(no_supply)),
+        ("points = 2", lambda: lift(elbow, points=2)),
+    )
+    for value in (math.nan, math.inf, -1.0):
+        refused(("pressure = ", lambda value=value: lift(elbow, pressure=value)))
+    told = r"to = .* rad .* at most joint.max_angle = 120.0 deg"
+    for value in (0.1, 3.0, math.nan):
+        refused((told, lambda value=value: lift(elbow, to=value)))
 
 
 def test_the_supply_is_the_default_and_the_text_is_as_the_numbers(elbow):
@@ -275,24 +250,10 @@ def test_the_supply_is_the_default_and_the_text_is_as_the_numbers(elbow):
 # --------------------------------------------------------------------- command line
 
 
-def run(capsys, *words):
-    return command(capsys, "lift", *words)
-
-
 def test_command_prints_and_writes(capsys, tmp_path):
     data, picture = tmp_path / "a.json", tmp_path / "a.png"
-    words = (
-        "elbow",
-        "--pressure",
-        "150 psi",
-        "--payload",
-        "380 lb",
-        "--json",
-        data,
-        "--png",
-        picture,
-    )
-    code, out, err = run(capsys, *words)
+    given = ("--pressure", "150 psi", "--payload", "380 lb", "--json", data, "--png", picture)
+    code, out, err = command(capsys, "lift", "elbow", *given)
     assert code == 0
     assert out.startswith("elbow: cannot lift 172.4 kg beyond 22.")
     assert sorted(err.splitlines()) == sorted(f"written: {path}" for path in (data, picture))
@@ -302,16 +263,12 @@ def test_command_prints_and_writes(capsys, tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
     file = tmp_path / "elbow.toml"
     rigs.named("elbow").to_toml(file)
-    assert run(capsys, file, "--pressure", "8 bar", "--to", "60 deg")[1].startswith(
-        "elbow: lifts 45.36 kg from 9.5 to 60.0 deg at 8 bar"
-    )
+    _, out, _ = command(capsys, "lift", file, "--pressure", "8 bar", "--to", "60 deg")
+    assert out.startswith("elbow: lifts 45.36 kg from 9.5 to 60.0 deg at 8 bar")
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    rows_of(__file__, "command_refuses_what_it_cannot_use"),
-)
-def test_command_refuses_what_it_cannot_use(capsys, words, message):
-    code, out, err = run(capsys, *words)
-    assert (code, out) == (2, "")
-    assert message in err
+def test_command_refuses_what_it_cannot_use(capsys):
+    for words, message in rows_of(__file__, "command_refuses_what_it_cannot_use"):
+        code, out, err = command(capsys, "lift", *words)
+        assert (code, out) == (2, "")
+        assert message in err

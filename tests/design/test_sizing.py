@@ -13,6 +13,7 @@ from pamrs.design import Filling
 from pamrs.design.sizing import Candidate, Requirement, SizingResult, packed_diameter, size
 from pamrs.errors import ParameterError
 from tests.reference.gas import orifice_flow
+from tests.simulation.refusals import refused
 
 PAIR = ("elbow_0625in", "large_2in_effective")
 ONE_POINT = Requirement([(0.0, 15e3)])
@@ -41,22 +42,20 @@ def test_count_never_falls_with_the_force_wanted():
     assert counts[-1][0]["count"] > counts[0][0]["count"]
 
 
+def elbows(*points, **given):
+    """The row of the elbow's muscle, at a pressure or in a number that is given."""
+    candidate = Candidate.from_library("elbow_0625in", **given)
+    return size([candidate], Requirement(points)).row("elbow_0625in")
+
+
 def test_count_never_rises_with_pressure():
-    counts = [
-        size(
-            [Candidate.from_library("elbow_0625in", pressure=p)],
-            Requirement([(0.0, 9e3), (0.03, 4e3)]),
-        ).rows[0]["count"]
-        for p in np.linspace(5e5, 12e5, 8)
-    ]
+    points = (0.0, 9e3), (0.03, 4e3)
+    counts = [elbows(*points, pressure=p)["count"] for p in np.linspace(5e5, 12e5, 8)]
     assert np.all(np.diff(counts) <= 0)
 
 
 def test_figures_scale_with_the_count():
-    one, six = (
-        size([Candidate.from_library("elbow_0625in", count=n)], Requirement([(0.01, 1e3)])).rows[0]
-        for n in (1, 6)
-    )
+    one, six = (elbows((0.01, 1e3), count=n) for n in (1, 6))
     keys = (
         "mass", "air_volume_rest", "air_volume_end", "air_volume_full", "air_mass_per_stroke",
         "energy_per_stroke",
@@ -69,15 +68,11 @@ def test_figures_scale_with_the_count():
 
 
 def test_air_volume_is_the_muscles_own():
-    row = size([Candidate.from_library("elbow_0625in", count=3)], Requirement([(0.02, 1e3)])).rows[
-        0
-    ]
-    muscle = library.elbow_0625in()
-    assert row["air_volume_rest"] == pytest.approx(3 * float(muscle.air_volume(0.0)))
-    assert row["air_volume_end"] == pytest.approx(
-        3 * float(muscle.air_volume(0.02 / muscle.parameters["rest_length"]))
-    )
-    assert row["air_volume_full"] == pytest.approx(3 * float(muscle.air_volume(0.37)), rel=1e-4)
+    row, muscle = elbows((0.02, 1e3), count=3), library.elbow_0625in()
+    end = 0.02 / muscle.parameters["rest_length"]
+    for at, contraction in (("rest", 0.0), ("end", end), ("full", 0.37)):
+        volume = 3 * float(muscle.air_volume(contraction))
+        assert row[f"air_volume_{at}"] == pytest.approx(volume, rel=1e-4 if at == "full" else 1e-6)
     absolute = row["pressure"] + 101325.0
     assert row["energy_per_stroke"] == pytest.approx(
         absolute * row["air_volume_end"] - 101325.0 * row["air_volume_rest"]
@@ -87,10 +82,9 @@ def test_air_volume_is_the_muscles_own():
 
 def test_contraction_requirement_equals_the_stroke_requirement():
     length = library.elbow_0625in().parameters["rest_length"]
-    by_stroke = size(["elbow_0625in"], Requirement([(0.1 * length, 5e3)])).row("elbow_0625in")
-    by_contraction = size(["elbow_0625in"], Requirement([(0.1, 5e3)], position="contraction")).row(
-        "elbow_0625in"
-    )
+    wanted = Requirement([(0.1, 5e3)], position="contraction")
+    by_contraction = size(["elbow_0625in"], wanted).row("elbow_0625in")
+    by_stroke = elbows((0.1 * length, 5e3))
     assert by_stroke.pop("name") == by_contraction.pop("name")
     assert by_stroke == pytest.approx(by_contraction, rel=1e-9)
 
@@ -99,11 +93,7 @@ def test_contraction_requirement_equals_the_stroke_requirement():
     ("candidate", "requirement", "reason"),
     [
         ("elbow_0625in", Requirement([(0.09, 100.0)]), "beyond the braid's limit"),
-        (
-            "elbow_0625in",
-            Requirement([(0.385, 100.0)], position="contraction"),
-            "no number is enough",
-        ),
+        ("elbow_0625in", Requirement([(0.385, 100.0)], "contraction"), "no number is enough"),
         ("elbow_0625in", Requirement([(0.0, 1e7)]), "at most 100 are considered"),
         (Candidate.from_library("elbow_0625in", count=2), ONE_POINT, "5 are needed, 2 are given"),
         (
@@ -111,6 +101,7 @@ def test_contraction_requirement_equals_the_stroke_requirement():
             ONE_POINT,
             "not below the supply's",
         ),
+        (Candidate.from_library("elbow_0625in", pressure=6.0), ONE_POINT, "were bar meant?"),
     ],
 )
 def test_infeasible_is_told_with_its_reason(candidate, requirement, reason):
@@ -167,12 +158,10 @@ def test_fill_time_against_the_reference_orifice():
 
 
 def test_fill_time_laws():
-    filling = Filling()
-    assert filling.time(2e-3, 6e5) == pytest.approx(2.0 * filling.time(1e-3, 6e5), rel=1e-12)
+    filling, double = Filling(), Filling().time(2e-3, 6e5)
+    assert double == pytest.approx(2.0 * filling.time(1e-3, 6e5), rel=1e-12)
+    assert double == pytest.approx(Filling(dead_volume=1e-3).time(1e-3, 6e5), rel=1e-12)
     assert filling.time(1e-3, 6e5) < filling.time(1e-3, 9e5) < filling.time(1e-3, 13.79e5)
-    assert Filling(dead_volume=1e-3).time(1e-3, 6e5) == pytest.approx(
-        filling.time(2e-3, 6e5), rel=1e-12
-    )
     # choked: dp/dt is constant
     choked = filling.time(1e-3, 4e5) / filling.time(1e-3, 2e5)
     assert choked == pytest.approx(2.0, rel=1e-10)
@@ -187,37 +176,33 @@ def test_sonic_conductance_gives_the_choked_flow():
     )
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: Requirement([]), "points has shape"),
-        (lambda: Requirement([(0.0, 1.0, 2.0)]), "points has shape"),
-        (lambda: Requirement([(0.0, math.nan)]), "finite"),
-        (lambda: Requirement([(0.0, -1.0)]), "none below zero"),
-        (lambda: Requirement([(0.1, 1.0), (0.0, 1.0)]), "increase"),
-        (lambda: Requirement([(0.0, 0.0)]), "no force is wanted"),
-        (lambda: Requirement([(0.0, 1.0)], position="angle"), "position = 'angle'"),
-        (lambda: Candidate.from_library("elbow_0625in", pressure=-1.0), "pressure = -1"),
-        (lambda: Candidate.from_library("elbow_0625in", count=0), "count = 0"),
-        (lambda: Candidate("x", library.elbow_0625in(), 1e5, mass=math.inf), "mass = inf"),
-        (lambda: Filling(area=0.0), "area = 0"),
-        (lambda: Filling(dead_volume=-1.0), "dead_volume"),
-        (lambda: Filling.from_sonic_conductance(math.nan), "conductance = nan"),
-        (lambda: Filling().time(1e-3, 14e5), "not below the supply's"),
-        (lambda: Filling().time(0.0, 1e5), "volume = 0"),
-        (lambda: packed_diameter(0, 0.01), "count = 0"),
-        (lambda: packed_diameter(math.nan, 0.01), "count = nan"),
-        (lambda: packed_diameter(3, 0.0), "diameter = 0"),
-        (lambda: size([], ONE_POINT), "candidates is empty"),
-        (lambda: size(["elbow_0625in", "elbow_0625in"], ONE_POINT), "used twice"),
-        (lambda: size(["elbow"], ONE_POINT), "not in the library"),
-        (lambda: size(["elbow_0625in"], ONE_POINT, core=-1.0), "core"),
-        (lambda: size(["elbow_0625in"], ONE_POINT, max_count=0), "max_count = 0"),
-    ],
-)
-def test_bad_input_is_named(call, message):
-    with pytest.raises(ParameterError, match=message):
-        call()
+def test_bad_input_is_named():
+    refused(
+        ("points has shape", lambda: Requirement([])),
+        ("points has shape", lambda: Requirement([(0.0, 1.0, 2.0)])),
+        ("finite", lambda: Requirement([(0.0, math.nan)])),
+        ("none below zero", lambda: Requirement([(0.0, -1.0)])),
+        ("increase", lambda: Requirement([(0.1, 1.0), (0.0, 1.0)])),
+        ("no force is wanted", lambda: Requirement([(0.0, 0.0)])),
+        ("position = 'angle'", lambda: Requirement([(0.0, 1.0)], position="angle")),
+        ("pressure = -1", lambda: Candidate.from_library("elbow_0625in", pressure=-1.0)),
+        ("count = 0", lambda: Candidate.from_library("elbow_0625in", count=0)),
+        ("pressure = 'x' is not allowed", lambda: Candidate("x", library.elbow_0625in(), "x")),
+        ("mass = inf", lambda: Candidate("x", library.elbow_0625in(), 1e5, mass=math.inf)),
+        ("area = 0", lambda: Filling(area=0.0)),
+        ("dead_volume", lambda: Filling(dead_volume=-1.0)),
+        ("conductance = nan", lambda: Filling.from_sonic_conductance(math.nan)),
+        ("not below the supply's", lambda: Filling().time(1e-3, 14e5)),
+        ("volume = 0", lambda: Filling().time(0.0, 1e5)),
+        ("count = 0", lambda: packed_diameter(0, 0.01)),
+        ("count = nan", lambda: packed_diameter(math.nan, 0.01)),
+        ("diameter = 0", lambda: packed_diameter(3, 0.0)),
+        ("candidates is empty", lambda: size([], ONE_POINT)),
+        ("used twice", lambda: size(["elbow_0625in", "elbow_0625in"], ONE_POINT)),
+        ("not in the library", lambda: size(["elbow"], ONE_POINT)),
+        ("core", lambda: size(["elbow_0625in"], ONE_POINT, core=-1.0)),
+        ("max_count = 0", lambda: size(["elbow_0625in"], ONE_POINT, max_count=0)),
+    )
 
 
 def test_a_muscle_whose_geometry_has_no_solution_is_infeasible():
@@ -227,17 +212,3 @@ def test_a_muscle_whose_geometry_has_no_solution_is_infeasible():
     result = size([Candidate("wide", wide, 5e5), "elbow_0625in"], Requirement([(0.0, 1e3)]))
     assert "at which the geometry has a solution" in result.infeasible["wide"]
     assert [row["name"] for row in result.rows] == ["elbow_0625in"]
-
-
-def test_a_pressure_in_bar_is_asked_about():
-    result = size([Candidate.from_library("elbow_0625in", pressure=6.0)], Requirement([(0.0, 1e3)]))
-    assert "were bar meant?" in result.infeasible["elbow_0625in"]
-
-
-def test_a_pressure_that_is_no_number_is_named():
-    with pytest.raises(ParameterError, match="pressure = 'x' is not allowed"):
-        Candidate(
-            "x",
-            Muscle(rest_length=0.2, rest_diameter=0.02, braid_angle=1.2, wall_thickness=0.001),
-            "x",
-        )

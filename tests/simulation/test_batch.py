@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 import os
 import pickle
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import pamrs
 from pamrs.simulation import core_rig
 from pamrs.simulation._plants import thread_count
 from tests.scripts import script
+from tests.simulation.refusals import refused
 
 DT = 0.002
 
@@ -32,32 +34,23 @@ def signals(rig: pamrs.Rig, n: int, sample: int) -> dict[str, Any]:
     given: dict[str, Any] = {}
     for name in core_rig(rig).inputs:
         channel, _, block = name.partition(".")
-        shift = 0.7 * len(given.get(channel, ()))
-        values = (
-            commands(n, sample + int(20 * shift))
-            if channel == "valve_command"
-            else 3e5 + 2e4 * commands(n, sample)
-        )
+        volts = commands(n, sample + 14 * len(given.get(channel, ())))
+        values = volts if channel == "valve_command" else 3e5 + 2e4 * volts
         given.setdefault(channel, {})[block] = values
     for load in rig.tables("load").values():
         if load["kind"] == "frame":
-            middle, half = (
-                0.5 * (load["max_length"] + load["min_length"]),
-                0.2 * (load["max_length"] - load["min_length"]),
-            )
-            given["length"] = middle + half * np.sin(0.1 * sample + np.arange(n))
+            low, high = load["min_length"], load["max_length"]
+            wave = np.sin(0.1 * sample + np.arange(n))
+            given["length"] = 0.5 * (high + low) + 0.2 * (high - low) * wave
             given["pressure"] = 2e5 + 1e4 * np.arange(n) + 1e3 * sample
     return given
 
 
 def row_of(given: dict[str, Any], row: int) -> dict[str, Any]:
-    one = {
-        name: {b: float(v[row]) for b, v in values.items()}
-        if isinstance(values, dict)
-        else float(values[row])
+    return {
+        name: row_of(values, row) if isinstance(values, dict) else float(values[row])
         for name, values in given.items()
     }
-    return one
 
 
 def agree(batch: pamrs.Batch, found: Any, wanted: Any, what: str = "") -> None:
@@ -102,8 +95,8 @@ def test_lanes_hold_the_rigs_that_simulate_batch_runs_in_them() -> None:
     for name in pamrs.rigs.names():
         found = pamrs.Batch(pamrs.rigs.named(name), n=2, sample_time=DT).side_by_side
         np.testing.assert_array_equal(found, [name in lanes] * 2, err_msg=name)
-    plain = pamrs.rigs.shoulder()
-    mixed = pamrs.Batch([plain, plain.with_effect("heat_transfer"), plain], sample_time=DT)
+    warm = pamrs.rigs.shoulder().with_effect("heat_transfer")
+    mixed = pamrs.Batch([SHOULDER, warm, SHOULDER], sample_time=DT)
     assert mixed.side_by_side.tolist() == [True, False, True]
     ones = [pamrs.Batch([rig], sample_time=DT) for rig in mixed.rigs]
     for k in range(20):
@@ -112,62 +105,52 @@ def test_lanes_hold_the_rigs_that_simulate_batch_runs_in_them() -> None:
         np.testing.assert_array_equal(values, [one[channel][0] for one in each], err_msg=channel)
 
 
-def test_what_has_a_memory_is_kept_apart() -> None:
-    friction = {"friction_constant": 2.0, "friction_pressure": 2e-5, "presliding": 1e-3}
-    rig = (
-        pamrs.rigs.shoulder()
-        .with_effect("muscle_hysteresis", friction)
-        .with_effect("heat_transfer")
-        .with_effect("clock_skew", {"offset": 0.013, "rate": 0.001})
-    )
-    batch = pamrs.Batch(rig, n=3, sample_time=DT)
-    ones = [pamrs.Simulator(rig, sample_time=DT) for _ in range(3)]
+SHOULDER, REGULATED = pamrs.rigs.shoulder(), pamrs.rigs.named("regulated_joint")
+LATE = SHOULDER.with_effect("clock_skew", {"offset": 0.013, "rate": 0.001})
+FRICTION = {"friction_constant": 2.0, "friction_pressure": 2e-5, "presliding": 1e-3}
+MEMORY = LATE.with_effect("muscle_hysteresis", FRICTION).with_effect("heat_transfer")
+
+
+@pytest.mark.parametrize(
+    ("rigs", "initial", "command"),
+    [
+        ([MEMORY] * 3, {}, lambda k: commands(3, k)),
+        (
+            [SHOULDER.with_parameters({"arm.payload": m}) for m in (0.0, 4.5, 9.07, 20.0)],
+            {"joint_angle": 0.5},
+            lambda k: np.full(4, 5.6 + 0.01 * k),
+        ),
+        # without a command each keeps its own pressure
+        (
+            [REGULATED.with_parameters({"supply.initial_pressure": p}) for p in (2e5, 3e5)],
+            {},
+            lambda k: None,
+        ),
+    ],
+    ids=["memory", "payloads", "regulators"],
+)
+def test_plants_of_several_rigs_are_those_one_by_one(
+    rigs: list[pamrs.Rig], initial: dict[str, float], command: Callable[[int], Any]
+) -> None:
+    batch = pamrs.Batch(rigs, sample_time=DT, initial=initial)
+    ones = [pamrs.Simulator(rig, sample_time=DT, initial=initial) for rig in rigs]
     for k in range(60):
-        seen = batch.step(commands(3, k))
-        alone = [one.step(float(u)) for one, u in zip(ones, commands(3, k), strict=True)]
+        given = command(k)
+        each = [None] * len(rigs) if given is None else given.tolist()
+        seen = batch.step(given)
+        alone = [one.step(own) for one, own in zip(ones, each, strict=True)]
     for channel, values in seen.items():
-        np.testing.assert_array_equal(values, [one[channel] for one in alone], err_msg=channel)
+        agree(batch, values, [one[channel] for one in alone], channel)
+    assert len(set(seen["muscle_pressure"])) == len(rigs)
+    assert batch.rigs == tuple(rigs)
 
 
 def test_a_clock_that_is_off_is_read_only_where_somebody_looks() -> None:
-    rig = pamrs.rigs.shoulder().with_effect("clock_skew", {"offset": 0.013, "rate": 0.001})
-    run = pamrs.Batch(rig, n=2, sample_time=DT).control(
-        lambda sample: 5.5, 0.04, period=0.02, record_every=10
-    )
-    one = pamrs.Simulator(rig, sample_time=DT)
+    batch, one = pamrs.Batch(LATE, n=2, sample_time=DT), pamrs.Simulator(LATE, sample_time=DT)
+    run = batch.control(lambda sample: 5.5, 0.04, period=0.02, record_every=10)
     for _ in range(20):
         last = one.step(5.5)
     np.testing.assert_array_equal(run["muscle_pressure"][:, -1], [last["muscle_pressure"]] * 2)
-
-
-def test_a_sweep_over_payloads_is_the_rigs_one_by_one() -> None:
-    base = pamrs.rigs.shoulder()
-    rigs = [base.with_parameters({"arm.payload": payload}) for payload in (0.0, 4.5, 9.07, 20.0)]
-    batch = pamrs.Batch(rigs, sample_time=DT, initial={"joint_angle": 0.5})
-    ones = [pamrs.Simulator(rig, sample_time=DT, initial={"joint_angle": 0.5}) for rig in rigs]
-    for k in range(50):
-        seen = batch.step(5.6 + 0.01 * k)
-        alone = [one.step(5.6 + 0.01 * k) for one in ones]
-    for channel, values in seen.items():
-        agree(batch, values, [one[channel] for one in alone], channel)
-    assert len(set(seen["joint_angle"])) == 4
-    assert batch.rigs == tuple(rigs)
-    with pytest.raises(pamrs.RigError, match="row 1: its inputs are"):
-        pamrs.Batch([base, pamrs.rigs.named("regulated_joint")], sample_time=DT)
-
-
-def test_a_regulator_without_a_command_keeps_its_own_pressure() -> None:
-    base = pamrs.rigs.named("regulated_joint")
-    rigs = [base.with_parameters({"supply.initial_pressure": pressure}) for pressure in (2e5, 3e5)]
-    batch, ones = (
-        pamrs.Batch(rigs, sample_time=DT),
-        [pamrs.Simulator(rig, sample_time=DT) for rig in rigs],
-    )
-    for _ in range(20):
-        seen, alone = batch.step(), [one.step() for one in ones]
-    for channel, values in seen.items():
-        agree(batch, values, [one[channel] for one in alone], channel)
-    assert seen["supply_pressure"][0] != seen["supply_pressure"][1]
 
 
 def failing() -> pamrs.Batch:
@@ -176,11 +159,8 @@ def failing() -> pamrs.Batch:
 
 
 def test_a_row_that_fails_says_why_and_the_others_go_on() -> None:
-    batch, alone = (
-        failing(),
-        pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.001, initial={"joint_rate": -500.0}),
-    )
-    healthy = shoulders(3, sample_time=0.001)
+    batch, healthy = failing(), shoulders(3, sample_time=0.001)
+    alone = pamrs.Simulator(SHOULDER, sample_time=0.001, initial={"joint_rate": -500.0})
     good, message = alone.observe(), ""
     for k in range(20):
         try:
@@ -252,13 +232,8 @@ def test_a_closed_loop_is_that_of_each_simulator() -> None:
         np.testing.assert_array_equal(alone.time, run.time)
         for channel in run:
             agree(batch, run[channel][row], alone[channel], channel)
-    few = shoulders(3).control(
-        Loop(gains, rates),
-        0.2,
-        period=0.004,
-        channels=("joint_angle", "valve_command"),
-        record_every=7,
-    )
+    kept = {"channels": ("joint_angle", "valve_command"), "record_every": 7}
+    few = shoulders(3).control(Loop(gains, rates), 0.2, period=0.004, **kept)
     assert set(few) == {"joint_angle", "valve_command"}
     np.testing.assert_array_equal(few.time, run.time[::7])
     for channel in few:
@@ -281,9 +256,7 @@ def test_a_loop_goes_on_where_the_last_one_ended() -> None:
 def test_an_answer_that_is_not_finite_ends_its_row_alone() -> None:
     def update(sample: dict[str, Any]) -> dict[str, Any]:
         late = sample["time"] > 0.0099
-        return {
-            "valve_command": np.array([5.5, np.nan if late else 5.5, 5.5, -np.inf if late else 5.5])
-        }
+        return {"valve_command": np.array([5.5, np.nan, 5.5, -np.inf] if late else [5.5] * 4)}
 
     run = shoulders(4).control(update, 0.04)
     assert run.failed.tolist() == [False, True, False, True]
@@ -301,9 +274,9 @@ def test_an_answer_that_is_not_finite_ends_its_row_alone() -> None:
 def test_names_of_several_valves_and_keywords_are_answers() -> None:
     rig = pamrs.rigs.named("antagonistic_joint")
     answer = {"flexor": np.array([5.5, 6.0]), "extensor": 4.8}
-    one = pamrs.Batch(rig, n=2, sample_time=DT).control(lambda sample: answer, 0.02)
-    two = pamrs.Batch(rig, n=2, sample_time=DT).control(
-        lambda sample: {"valve_command": answer}, 0.02
+    one, two = (
+        pamrs.Batch(rig, n=2, sample_time=DT).control(lambda sample, told=told: told, 0.02)
+        for told in (answer, {"valve_command": answer})
     )
     np.testing.assert_array_equal(one["joint_angle.elbow"], two["joint_angle.elbow"])
     np.testing.assert_array_equal(one["valve_command.extensor"], np.full((2, 11), 4.8))
@@ -313,56 +286,38 @@ def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
     batch = shoulders(3)
     batch.step(5.5)
     before = batch.state
-    with pytest.raises(pamrs.ParameterError, match=r"valve_command\[1\] = NaN"):
-        batch.step([5.0, np.nan, 5.0])
-    with pytest.raises(
-        pamrs.ParameterError, match=r"valve_command has the shape \(2,\); \(3,\) is needed"
-    ):
-        batch.step([5.0, 5.0])
-    with pytest.raises(pamrs.ParameterError, match="valve_command is missing"):
-        batch.step()
-    with pytest.raises(pamrs.ParameterError, match=r"valve_command = .* is not allowed: numbers"):
-        batch.step(["a", "b", "c"])
-    with pytest.raises(pamrs.ParameterError, match="supply_command is given"):
-        batch.step(5.0, supply_command=1e5)
-    for name, value in (
-        ("period", 0.003),
-        ("duration", -1.0),
-        ("duration", np.nan),
-        ("record_every", 0),
-        ("channels", ["angle"]),
-    ):
-        with pytest.raises(pamrs.ParameterError, match=f"{name} (= |has )"):
-            batch.control(lambda sample: 5.0, **{"duration": 0.1, name: value})
-    with pytest.raises(pamrs.ParameterError, match="update is a float"):
-        batch.control(5.0, 0.1)  # type: ignore[arg-type]
-    with pytest.raises(pamrs.ParameterError, match="2 GB"):
-        batch.control(lambda sample: 5.0, 1e5)
-    for state, message in (
-        ({**before, "rows": before["rows"][:2]}, "state is of 2 rows and 3 status; 3 are"),
-        ({**before, "rows": [*before["rows"][:2], before["rows"][2][:-1]]}, "row 2: state"),
-        (
-            {
-                **before,
-                "rows": [
-                    before["rows"][0],
-                    np.full_like(before["rows"][1], np.nan),
-                    before["rows"][2],
-                ],
-            },
-            r"row 1: state\[0\]",
-        ),
-        ({**before, "samples": 7}, "row 0: state.samples = 1"),
-        ({**before, "samples": -1}, "state.samples = -1"),
-        ({**before, "status": (None,)}, "state is of 3 rows and 1 status; 3 are"),
-        ({**before, "status": (1, 2, 3)}, "state is not one of a batch"),
-        ({"rows": 1}, "state has rows; samples, rows and status"),
-        (3, "state has 3"),
-    ):
-        with pytest.raises(pamrs.ParameterError, match=message):
-            batch.restore(state)  # type: ignore[arg-type]
-    with pytest.raises(pamrs.ParameterError, match="muscle_pressure"):
-        batch.reset({"muscle_pressure": [1e5, -1e9, 1e5]})
+    first, second, third = before["rows"]
+
+    def loop(update: Any = lambda sample: 5.0, duration: float = 0.1, **options: Any) -> Any:
+        return batch.control(update, duration, **options)
+
+    def restored(**changes: Any) -> Any:
+        return lambda: batch.restore({**before, **changes})
+
+    refused(
+        (r"valve_command\[1\] = NaN", lambda: batch.step([5.0, np.nan, 5.0])),
+        (r"valve_command has the shape \(2,\); \(3,\) is needed", lambda: batch.step([5.0, 5.0])),
+        ("valve_command is missing", batch.step),
+        ("valve_command = .* is not allowed: numbers", lambda: batch.step(["a", "b", "c"])),
+        ("supply_command is given", lambda: batch.step(5.0, supply_command=1e5)),
+        ("period = ", lambda: loop(period=0.003)),
+        ("duration = ", lambda: loop(duration=-1.0)),
+        ("duration = ", lambda: loop(duration=np.nan)),
+        ("record_every = ", lambda: loop(record_every=0)),
+        ("channels has ", lambda: loop(channels=["angle"])),
+        ("update is a float", lambda: loop(5.0)),
+        ("2 GB", lambda: loop(duration=1e5)),
+        ("state is of 2 rows and 3 status; 3 are", restored(rows=[first, second])),
+        ("row 2: state", restored(rows=[first, second, third[:-1]])),
+        (r"row 1: state\[0\]", restored(rows=[first, np.full_like(second, np.nan), third])),
+        ("row 0: state.samples = 1", restored(samples=7)),
+        ("state.samples = -1", restored(samples=-1)),
+        ("state is of 3 rows and 1 status; 3 are", restored(status=(None,))),
+        ("state is not one of a batch", restored(status=(1, 2, 3))),
+        ("state has rows; samples, rows and status", lambda: batch.restore({"rows": 1})),
+        ("state has 3", lambda: batch.restore(3)),  # type: ignore[arg-type]
+        ("muscle_pressure", lambda: batch.reset({"muscle_pressure": [1e5, -1e9, 1e5]})),
+    )
     same(batch.state, before)
 
 
@@ -376,28 +331,20 @@ def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
         ({"threads": 0}, "threads = 0"),
         ({"sample_time": 0.0}, "sample_time = 0"),
         ({"step": 0.0003}, "step = 0.0003"),
-        (
-            {"initial": {"muscle_pressure": [1e5, 2e5]}},
-            "initial muscle_pressure is for 2 plants, n for 3",
-        ),
-        (
-            {"initial": {"muscle_pressure": [1e5, np.inf, 2e5]}},
-            r"initial muscle_pressure\[1\] = inf",
-        ),
+        ({"initial": {"muscle_pressure": [1e5, 2e5]}}, "muscle_pressure is for 2 plants, n for 3"),
+        ({"initial": {"muscle_pressure": [1e5, np.inf, 2e5]}}, r"muscle_pressure\[1\] = inf"),
         ({"initial": {"muscle_pressure": [[1e5, 1e5, 2e5]]}}, "shape"),
         ({"initial": {"pressure": 1e5}}, "unknown entry 'pressure'"),
         ({"initial": {"joint_angle": [0.5, 40.0, 0.5]}}, "row 1: initial.joint_angle = 40"),
+        ({"rig": []}, "empty"),
+        ({"rig": "shoulder"}, "rig is a str"),
+        ({"rig": 5}, "rig is a int"),
+        ({"rig": [SHOULDER, REGULATED], "n": 2}, "row 1: its inputs are"),
     ],
 )
 def test_a_batch_that_cannot_be_says_why(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(pamrs.ParameterError, match=message):
-        pamrs.Batch(pamrs.rigs.shoulder(), **{"n": 3, "sample_time": DT, **changes})
-
-
-def test_only_rigs_make_a_batch() -> None:
-    for wrong, message in (([], "empty"), ("shoulder", "rig is a str"), (5, "rig is a int")):
-        with pytest.raises(pamrs.ParameterError, match=message):
-            pamrs.Batch(wrong, n=1, sample_time=DT)  # type: ignore[arg-type]
+    with pytest.raises((pamrs.ParameterError, pamrs.RigError), match=message):
+        pamrs.Batch(**{"rig": SHOULDER, "n": 3, "sample_time": DT, **changes})
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
@@ -455,11 +402,9 @@ def test_a_controller_cannot_change_what_is_recorded():
 
 
 def test_a_reset_is_a_new_batch_and_keeps_its_threads():
-    rigs = [pamrs.rigs.shoulder().with_parameters({"arm.payload": m}) for m in (2.0, 9.0)]
-    used, new = (
-        pamrs.Batch(rigs, sample_time=0.005, initial={"joint_angle": [0.4, 0.6]}, threads=2)
-        for _ in range(2)
-    )
+    rigs = [SHOULDER.with_parameters({"arm.payload": m}) for m in (2.0, 9.0)]
+    options = {"sample_time": 0.005, "initial": {"joint_angle": [0.4, 0.6]}, "threads": 2}
+    used, new = (pamrs.Batch(rigs, **options) for _ in range(2))
     core = used._core
     for _ in range(50):
         used.step([9.0, 6.0])

@@ -10,6 +10,7 @@ import pytest
 import pamrs
 from pamrs.rig import parse_rig
 from tests.runs import RUNS
+from tests.simulation.refusals import refused
 
 AMBIENT, TEMPERATURE, GAS_CONSTANT, KAPPA = 101325.0, 293.15, 287.05, 1.4
 
@@ -46,8 +47,8 @@ discharge_area = {{ value = 1.0, unit = "mm2" }}
 
 def _inner(run: pamrs.Simulation, name: str) -> np.ndarray:
     """Internal energy of a chamber, J."""
-    absolute = run[f"muscle_pressure.{name}"] + AMBIENT
-    return absolute * run[f"air_volume.{name}"] / (KAPPA - 1.0)
+    absolute = run.under("muscle_pressure")[name] + AMBIENT
+    return absolute * run.under("air_volume")[name] / (KAPPA - 1.0)
 
 
 def test_filling_without_a_wall_is_adiabatic() -> None:
@@ -89,10 +90,7 @@ def test_two_chambers_keep_their_energy_and_mass() -> None:
         _chamber("b", 3e-3, 0.0, 0.0),
     )
     run = pamrs.simulate(rig, sample_time=0.01, duration=8.0)
-    for whole in (
-        _inner(run, "a") + _inner(run, "b"),
-        run["air_mass.a"] + run["air_mass.b"],
-    ):
+    for whole in (_inner(run, "a") + _inner(run, "b"), run["air_mass.a"] + run["air_mass.b"]):
         np.testing.assert_allclose(whole, whole[0], rtol=1e-12)
     even = (6e5 * 1e-3) / 4e-3
     assert run["muscle_pressure.a"][-1] == pytest.approx(even, abs=20.0)
@@ -118,19 +116,14 @@ def _anew(name: str) -> pamrs.Rig:
 )
 def test_mass_and_energy_close_while_an_arm_moves(name: str) -> None:
     """A rig written anew: what it stores is what came in, to 1e-9 of what moved."""
-    usual, rig = RUNS[name], _anew(name)
-    run = pamrs.simulate(
-        rig, sample_time=usual.sample_time, step=1e-4, initial=dict(usual.initial), **usual.keywords
-    )
+    usual = RUNS[name]
+    drive = {"sample_time": usual.sample_time, "initial": dict(usual.initial), **usual.keywords}
+    run = pamrs.simulate(_anew(name), step=1e-4, **drive)
     balance = run.balance
     moved = balance.supplied + balance.vented + abs(balance.stored)
     assert abs(balance.residual) < 1e-9 * moved
     assert abs(balance.created) < 1e-9 * moved
-    absolute = {block: values + AMBIENT for block, values in run.under("muscle_pressure").items()}
-    inner = sum(
-        absolute[block] * volume / (KAPPA - 1.0)
-        for block, volume in run.under("air_volume").items()
-    )
+    inner = sum(_inner(run, block) for block in run.under("air_volume"))
     gained = run["enthalpy_gained"] + run["heat_gained"] - run["gas_work"]
     gained = gained - gained[0]
     scale = float(np.abs(run["enthalpy_gained"]).max() + np.abs(run["gas_work"]).max())
@@ -155,10 +148,10 @@ def test_published_coefficients_make_air() -> None:
 
 def test_the_effect_is_not_needed_where_the_chamber_has_it() -> None:
     rig = _anew("shoulder")
-    with pytest.raises(pamrs.ParameterError, match="chamber of the kind coefficients"):
-        rig.with_effect("heat_transfer")
     text = pamrs.rigs.template("shoulder").replace("dead_volume", "alpha = 1.2\ndead_volume", 1)
-    with pytest.raises(pamrs.RigError, match="alpha is not allowed with 'energy_balance'"):
-        parse_rig(text)
-    with pytest.raises(pamrs.ParameterError, match="gas = 'ideal'"):
-        pamrs.rigs.template(gas="ideal")
+    refused(
+        ("chamber of the kind coefficients", lambda: rig.with_effect("heat_transfer")),
+        ("alpha is not allowed with 'energy_balance'", lambda: parse_rig(text)),
+        ("gas = 'ideal'", lambda: pamrs.rigs.template(gas="ideal")),
+        by=pamrs.PamrsError,
+    )

@@ -1,10 +1,9 @@
 """A spring across a joint: its sign, the free arm's frequency, its energy, where it balances the
-weight, and how a file has it.
+weight.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.rig import parse_rig
 from tests.property.networks import MUSCLE, Blocks, rig_of
 
 STIFFNESS, REST, INERTIA = 30.0, 0.9, 0.2
@@ -41,12 +39,9 @@ SPRING = {"stiffness": STIFFNESS, "spring_angle": REST}
 
 @pytest.mark.parametrize("kind", ["one_link", "planar"])
 def test_the_free_arm_swings_with_the_root_of_stiffness_over_inertia(kind: str) -> None:
-    run = pamrs.simulate(
-        free_arm(kind, **SPRING),
-        duration=2.0,
-        sample_time=0.001,
-        initial={"joint_angle": REST + 0.5},
-    )
+    start = {"joint_angle": REST + 0.5}
+    arm = free_arm(kind, **SPRING)
+    run = pamrs.simulate(arm, duration=2.0, sample_time=0.001, initial=start)
     frequency = math.sqrt(STIFFNESS / INERTIA)
     wanted = REST + 0.5 * np.cos(frequency * run["time"])
     np.testing.assert_allclose(run["joint_angle"], wanted, rtol=0.0, atol=1e-7)
@@ -75,48 +70,6 @@ def test_at_rest_it_carries_the_weight() -> None:
     angle = run["joint_angle"][-1]
     assert STIFFNESS * (REST - angle) == pytest.approx(9.80665 * 1.2 * math.sin(angle), rel=1e-6)
     assert 0.1 < angle < REST
-
-
-def test_a_plant_in_a_batch_and_one_without_a_spring() -> None:
-    """Each of a batch as it is alone; stiffness zero is none, to the last bit."""
-    plain = pamrs.rigs.shoulder()
-    time = 0.005 * np.arange(101)
-    volts = 5.0 + 0.8 * np.sin(4.0 * time)
-    values = np.array([0.0, 10.0, 60.0])
-    sprung = plain.with_parameters({"joint.spring_angle": 1.0})
-    rigs = [sprung.with_parameters({"joint.stiffness": float(k)}) for k in values]
-    batch = pamrs.Batch(rigs, sample_time=0.005)
-    assert batch.side_by_side.all()
-    found = np.array([batch.step(float(u))["joint_angle"] for u in volts[:-1]])
-    alone = [pamrs.simulate(rig, volts, sample_time=0.005)["joint_angle"] for rig in rigs]
-    np.testing.assert_array_equal(found.T, [angle[1:] for angle in alone])
-    assert np.ptp(found[-1]) > 1e-3
-    without = pamrs.simulate(plain, volts, sample_time=0.005)["joint_angle"]
-    np.testing.assert_array_equal(alone[0], without)
-
-
-# ------------------------------------------------------------------ the file
-
-
-def test_a_rig_keeps_its_spring() -> None:
-    rig = pamrs.rigs.named("antagonistic_joint")
-    assert rig.tables("joint")["elbow"]["stiffness"] == 0.0
-    assert "stiffness" not in json.loads(rig.to_json())["joints"][0]
-    text = rig.to_toml_text().replace(
-        "[joint.elbow]",
-        '[joint.elbow]\nstiffness = { value = 2.5, unit = "N m/rad", tol = 0.5 }\n'
-        'spring_angle = { value = 30, unit = "deg" }',
-    )
-    sprung = parse_rig(text)
-    own = sprung.tables("joint")["elbow"]
-    assert own["stiffness"] == 2.5
-    assert own["spring_angle"] == pytest.approx(math.pi / 6)
-    assert sprung.parameter("joint.elbow.stiffness").tol == 0.5
-    again = parse_rig(sprung.to_toml_text())
-    assert again.model == sprung.model
-    assert again.parameter("joint.elbow.stiffness").tol == 0.5
-    core = json.loads(sprung.to_json())
-    assert core["joints"][0]["stiffness"] == 2.5
 
 
 @pytest.mark.parametrize(

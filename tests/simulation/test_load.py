@@ -10,6 +10,7 @@ import pytest
 import pamrs
 from pamrs.fit import ForceMap, fit_muscle
 from pamrs.rig import parse_rig
+from tests.simulation.refusals import refused
 from tests.tables import rows_of, text_of
 
 MASS = text_of(__file__, "hanging")
@@ -30,9 +31,8 @@ def test_a_bench_measures_the_force_of_its_muscle_in_both_directions() -> None:
     np.testing.assert_allclose(run["muscle_pressure"], 4e5, rtol=1e-12)
     e = 1.0 - length / 0.276
     for rows, way in ((slice(20, 201), -1.0), (slice(221, 401), 1.0)):
-        np.testing.assert_allclose(
-            run["muscle_force"][rows], muscle().force(4e5, e[rows], direction=way), rtol=1e-8
-        )
+        pull = muscle().force(4e5, e[rows], direction=way)
+        np.testing.assert_allclose(run["muscle_force"][rows], pull, rtol=1e-8)
 
 
 def test_a_shut_chamber_on_the_frame_follows_its_volume() -> None:
@@ -56,9 +56,8 @@ def test_steps_on_the_frame_are_the_run() -> None:
     rig = pamrs.rigs.bench(muscle())
     length = np.linspace(0.276, 0.25, 30)
     whole = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(30, 2e5))
-    one = pamrs.Simulator(
-        rig, sample_time=0.01, initial={"muscle_pressure": 2e5, "length": float(length[0])}
-    )
+    start = {"muscle_pressure": 2e5, "length": float(length[0])}
+    one = pamrs.Simulator(rig, sample_time=0.01, initial=start)
     for row in range(1, 30):
         sample = one.step(length=float(length[row]), pressure=2e5)
         assert sample["muscle_force"] == whole["muscle_force"][row]
@@ -67,17 +66,13 @@ def test_steps_on_the_frame_are_the_run() -> None:
 def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
     real = muscle().replace(friction_coefficient=0.0)
     p, e = (grid.ravel() for grid in np.meshgrid([2e5, 4e5, 6e5], np.linspace(0.0, 0.25, 8)))
-    data = ForceMap.from_arrays(
-        length=0.276 * (1.0 - e), pressure=p, force=real.force(p, e), rest_length=0.276
-    )
+    measured = {"length": 0.276 * (1.0 - e), "pressure": p, "force": real.force(p, e)}
+    data = ForceMap.from_arrays(**measured, rest_length=0.276)
     rig = parse_rig(fit_muscle(data, real, order=2).to_rig().to_toml_text())
     length = np.linspace(0.276, 0.21, 50)
     run = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(50, 3e5))
-    np.testing.assert_allclose(
-        run["muscle_force"],
-        np.maximum(real.force(3e5, 1.0 - length / 0.276), 0.0),  # it does not push
-        rtol=1e-7,
-    )
+    pull = np.maximum(real.force(3e5, 1.0 - length / 0.276), 0.0)  # it does not push
+    np.testing.assert_allclose(run["muscle_force"], pull, rtol=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -89,21 +84,19 @@ def test_what_a_frame_cannot_do_is_named(arguments: dict[str, object], message: 
         pamrs.simulate(pamrs.rigs.bench(muscle()), sample_time=0.01, **arguments)  # type: ignore[arg-type]
 
 
-def test_the_row_whose_initial_length_is_not_that_of_the_frame_is_named() -> None:
-    with pytest.raises(pamrs.PamrsError, match=r"= 0\.25 does .* length\[0\] = 0\.27 of row 1"):
-        pamrs.simulate_batch(
-            pamrs.rigs.bench(muscle()),
-            sample_time=0.01,
-            length=[0.27, 0.26],
-            initial={"length": [0.27, 0.25]},
-        )
-
-
 def test_only_a_frame_takes_a_length_and_no_valve_a_pressure() -> None:
-    with pytest.raises(pamrs.PamrsError, match="only a rig with a load frame"):
-        pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=0.1, length=[0.1, 0.1])
-    with pytest.raises(pamrs.PamrsError, match=r"without \[valve\]"):
-        pamrs.simulate(pamrs.rigs.shoulder(), [5.0, 5.0], sample_time=0.01, pressure=[0.0, 1e5])
+    arm, sealed = pamrs.rigs.shoulder(), pamrs.rigs.sealed_chamber()
+    short = {"length": [0.27, 0.26], "sample_time": 0.01}
+    pushed = {"pressure": [0.0, 1e5], "sample_time": 0.01}
+    bench, other = pamrs.rigs.bench(muscle()), {"initial": {"length": [0.27, 0.25]}}
+    # the row whose initial length is not that of the frame
+    told = r"= 0\.25 does .* length\[0\] = 0\.27 of row 1"
+    refused(
+        ("only a rig with a load frame", lambda: pamrs.simulate(sealed, **short)),
+        (r"without \[valve\]", lambda: pamrs.simulate(arm, [5.0, 5.0], **pushed)),
+        (told, lambda: pamrs.simulate_batch(bench, **short, **other)),
+        by=pamrs.PamrsError,
+    )
 
 
 @pytest.mark.parametrize(
@@ -116,32 +109,10 @@ def test_loads_that_cannot_be_are_named(old: str, new: str, message: str) -> Non
 
 
 def test_a_load_and_a_joint_exclude_each_other() -> None:
-    load = (
-        '[load]\nkind = "frame"\nmin_length = { value = 200, unit = "mm" }\n'
-        'max_length = { value = 270, unit = "mm" }\n'
-    )
+    bench, arm = (rig.to_toml_text() for rig in (pamrs.rigs.bench(muscle()), pamrs.rigs.shoulder()))
+    load = bench[bench.index("\n[load]") :].split("\n\n")[0]
     with pytest.raises(pamrs.RigError, match=r"\[load\] does not go with \[joint\] and \[arm\]"):
-        parse_rig(pamrs.rigs.shoulder().to_toml_text() + load)
-
-
-def test_a_load_without_its_length_is_refused_with_what_to_measure(tmp_path: Path) -> None:
-    (tmp_path / "rig.toml").write_text(MASS, encoding="utf-8")
-    run = pamrs.simulate(
-        parse_rig(MASS),
-        sample_time=0.01,
-        duration=2.0,
-        initial={"muscle_pressure": 4e5, "length": 0.25},
-    )
-    rows = "\n".join(
-        f"{t:.3f},{p:.3f}" for t, p in zip(run.time, run["muscle_pressure"], strict=True)
-    )
-    (tmp_path / "run.csv").write_text(f"time [s],muscle_pressure [Pa]\n{rows}\n", encoding="utf-8")
-    case = (
-        'schema = "pamrs.case/1"\nrig = "rig.toml"\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
-    )
-    (tmp_path / "case.toml").write_text(case, encoding="utf-8")
-    with pytest.raises(pamrs.DiagnosisError, match=r"measure muscle_pressure, length$"):
-        pamrs.diagnose(tmp_path)
+        parse_rig(arm + load)
 
 
 def test_air_of_a_regulator_that_is_then_shut_is_at_room_temperature() -> None:

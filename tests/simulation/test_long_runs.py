@@ -47,14 +47,9 @@ def test_energy_of_a_thousand_swings_stays() -> None:
     rig = frictionless()
     start, pressure, sample = math.radians(70.0), 3.5e5, 0.01
     shut = rig.parameter("valve.null_voltage").value
-    rows = 110_000
-    run = pamrs.simulate(
-        rig,
-        np.full(rows, shut),
-        sample_time=sample,
-        initial={"joint_angle": start, "muscle_pressure": pressure},
-        record=["joint_angle", "joint_rate"],
-    )
+    rows, begun = 110_000, {"joint_angle": start, "muscle_pressure": pressure}
+    kept = {"sample_time": sample, "record": ["joint_angle", "joint_rate"]}
+    run = pamrs.simulate(rig, np.full(rows, shut), initial=begun, **kept)
     angle, rate = run["joint_angle"], run["joint_rate"]
     turns = int((np.diff(np.sign(rate)) != 0).sum())
     assert turns >= 2 * CYCLES

@@ -16,6 +16,7 @@ from tests.property.networks import MUSCLE, Blocks, rig_of
 
 QUARTER = math.pi / 2
 GRAVITY = 9.80665
+ARM = {"inertia": 0.3, "first_moment": 1.5, "length": 0.5, "payload": 3.0, "viscous": 0.8}
 
 
 def arm_of(rest: float, reach: tuple[float, float], **arm: Any) -> pamrs.Rig:
@@ -26,14 +27,7 @@ def arm_of(rest: float, reach: tuple[float, float], **arm: Any) -> pamrs.Rig:
         "chamber": {"dead_volume": 1e-4, "initial_pressure": 1e5},
         "muscle": MUSCLE,
         "joint": {"kind": "pulley", "radius": 0.015, "rest_angle": rest, **stops},
-        "arm": {
-            "inertia": 0.3,
-            "first_moment": 1.5,
-            "length": 0.5,
-            "payload": 3.0,
-            "viscous": 0.8,
-            **arm,
-        },
+        "arm": {**ARM, **arm},
     }
     return rig_of(blocks)
 
@@ -82,23 +76,30 @@ def test_the_centre_of_mass_turns_alone() -> None:
     assert np.abs(loaded["joint_angle"] - tilted["joint_angle"]).max() > 0.01
 
 
-def test_tilts_in_a_batch_are_each_alone() -> None:
-    """Side by side in lanes; those that hang straight keep their bits among tilted ones."""
+TILTS = ((0.0, 0.0), (-0.6, 0.0), (0.3, 0.2), (0.0, -0.3))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        [{"arm.base_angle": tilt, "arm.centre_angle": centre} for tilt, centre in TILTS],
+        [{"joint.spring_angle": 1.0, "joint.stiffness": k} for k in (0.0, 10.0, 60.0)],
+        [{"muscle.softening": 4e-3, "muscle.temperature": t} for t in (293.15, 313.15)],
+    ],
+    ids=["mounting", "spring", "softening"],
+)
+def test_plants_in_a_batch_are_each_alone(changes: list[dict[str, float]]) -> None:
+    """Side by side in lanes; one for which it comes to nothing keeps its bits among the others."""
     plain = pamrs.rigs.shoulder()
     volts = 5.0 + 0.8 * np.sin(4.0 * 0.005 * np.arange(101))
-    rigs = [
-        plain.with_parameters({"arm.base_angle": tilt, "arm.centre_angle": centre})
-        for tilt, centre in ((0.0, 0.0), (-0.6, 0.0), (0.3, 0.2), (0.0, -0.3))
-    ]
+    rigs = [plain.with_parameters(change) for change in changes]
     batch = pamrs.Batch(rigs, sample_time=0.005)
     assert batch.side_by_side.all()
     found = np.array([batch.step(float(u))["joint_angle"] for u in volts[:-1]])
-    for rig, angle in zip(rigs, found.T, strict=True):
+    for rig, angle in zip([*rigs, plain], [*found.T, found[:, 0]], strict=True):
         alone = pamrs.simulate(rig, volts, sample_time=0.005)["joint_angle"]
         np.testing.assert_array_equal(angle, alone[1:])
-    assert len({float(angle) for angle in found[-1]}) == 4
-    whole = pamrs.simulate(plain, volts, sample_time=0.005)["joint_angle"]
-    np.testing.assert_array_equal(found[:, 0], whole[1:])
+    assert len({float(angle) for angle in found[-1]}) == len(rigs)
 
 
 def test_a_payload_on_a_cord_hangs_straight_down_from_a_tilted_arm() -> None:
@@ -116,25 +117,49 @@ def test_a_payload_on_a_cord_hangs_straight_down_from_a_tilted_arm() -> None:
     np.testing.assert_allclose(turned + 0.7, plumb, rtol=0.0, atol=1e-8)
 
 
-def test_a_rig_keeps_how_its_arm_is_mounted() -> None:
-    rig = pamrs.rigs.shoulder()
-    core = json.loads(rig.to_json())["arm"]
-    assert not {"base_angle", "centre_angle"} & set(core)
-    lines = [
-        f'{key} = {{ value = {value}, unit = "deg", tol = 2 }}'
-        for key, value in (("base_angle", "-90"), ("centre_angle", "12"))
-    ]
-    text = rig.to_toml_text().replace("[arm]\n", "[arm]\n" + "\n".join(lines) + "\n")
-    mounted = parse_rig(text)
-    assert mounted.parameter("arm.base_angle").value == pytest.approx(-QUARTER)
-    assert mounted.parameter("arm.centre_angle").tol == pytest.approx(math.radians(2.0))
-    again = parse_rig(mounted.to_toml_text())
-    assert again.model == mounted.model
-    assert again.parameter("arm.base_angle").tol == mounted.parameter("arm.base_angle").tol
-    assert json.loads(again.to_json())["arm"]["centre_angle"] == pytest.approx(math.radians(12.0))
+#: Rig, block, what is written into it, key -> value and tolerance, and what the core is told.
+KEPT: dict[str, tuple[str, str, dict[str, str], dict[str, tuple[float, float]], Any]] = {
+    "mounting": (
+        "shoulder",
+        "arm",
+        {"base_angle": '-90, unit = "deg", tol = 2', "centre_angle": '12, unit = "deg", tol = 2'},
+        {"base_angle": (-QUARTER, math.pi / 90), "centre_angle": (math.pi / 15, math.pi / 90)},
+        lambda core: (core["arm"].get("centre_angle"), math.pi / 15),
+    ),
+    "spring": (
+        "antagonistic_joint",
+        "joint.elbow",
+        {"stiffness": '2.5, unit = "N m/rad", tol = 0.5', "spring_angle": '30, unit = "deg"'},
+        {"stiffness": (2.5, 0.5), "spring_angle": (math.pi / 6, 0.0)},
+        lambda core: (core["joints"][0].get("stiffness"), 2.5),
+    ),
+    "softening": (
+        "shoulder",
+        "muscle",
+        {"softening": '0.4, unit = "%/K", tol = 0.1', "temperature": '40, unit = "degC"'},
+        {"softening": (4e-3, 1e-3), "temperature": (313.15, 0.0)},
+        lambda core: (core["muscles"][0]["muscle"].get("softening"), 4e-3),
+    ),
+}
 
 
-def test_an_arm_is_fitted_by_its_mounting_and_its_joints_springs() -> None:
+@pytest.mark.parametrize("name", KEPT)
+def test_a_rig_keeps_what_is_written_and_the_core_is_told_no_more(name: str) -> None:
+    named, block, lines, wanted, told = KEPT[name]
+    rig = pamrs.rigs.named(named)
+    assert not told(json.loads(rig.to_json()))[0]
+    written = "".join(f"{key} = {{ value = {value} }}\n" for key, value in lines.items())
+    changed = parse_rig(rig.to_toml_text().replace(f"[{block}]\n", f"[{block}]\n{written}"))
+    again = parse_rig(changed.to_toml_text(comments=False))
+    assert again.model == changed.model
+    for key, (value, tol) in wanted.items():
+        found = again.parameter(f"{block}.{key}")
+        assert (found.value, found.tol) == pytest.approx((value, tol))
+    there, expected = told(json.loads(again.to_json()))
+    assert there == pytest.approx(expected)
+
+
+def test_an_arm_is_fitted_by_its_mounting_its_joints_springs_and_its_muscles() -> None:
     channels = ("muscle_pressure.elbow", "muscle_pressure.wrist")
     channels += ("joint_angle.elbow", "joint_angle.wrist")
     blocks = available_blocks(pamrs.rigs.named("two_joint_arm"), channels)
@@ -142,6 +167,9 @@ def test_an_arm_is_fitted_by_its_mounting_and_its_joints_springs() -> None:
     assert len(arms) == 2
     wanted = {"arm.base_angle", "joint.elbow.stiffness", "joint.wrist.spring_angle"}
     assert all(wanted <= arm.parameters for arm in arms)
+    channels = ("supply_pressure", "muscle_pressure", "joint_angle", "valve_command")
+    arm = available_blocks(pamrs.rigs.shoulder(), channels)[-1]
+    assert {"muscle.softening", "muscle.temperature"} <= arm.parameters
 
 
 def test_what_cannot_be_is_refused_by_name() -> None:

@@ -22,13 +22,9 @@ RIGS = {
 
 def signals(rig: pamrs.Rig) -> dict[str, np.ndarray]:
     wave = np.sin(8.0 * SAMPLE * np.arange(ROWS))
-    valves = list(rig.tables("valve").values())
-    return {
-        name: valves[k]["null_voltage"] + 0.6 * valves[k]["half_range"] * wave
-        if k < len(valves)
-        else 4e5 + 1e5 * wave
-        for k, name in enumerate(core_rig(rig).inputs)
-    }
+    valves = [(v["null_voltage"], v["half_range"]) for v in rig.tables("valve").values()]
+    given = [null + 0.6 * half * wave for null, half in valves] or [4e5 + 1e5 * wave]
+    return dict(zip(core_rig(rig).inputs, given, strict=False))
 
 
 @pytest.mark.parametrize("name", RIGS)
@@ -68,17 +64,14 @@ def test_a_prescribed_pressure_needs_no_sums():
     pressure = 2e5 + 1e5 * np.sin(8.0 * SAMPLE * np.arange(ROWS))
     length = np.full(ROWS, rig.model["muscle"]["rest_length"])
     drive = {"sample_time": SAMPLE, "pressure": pressure, "length": length}
-    whole, kept = (
-        pamrs.simulate(rig, **drive),
-        pamrs.simulate(rig, **drive, record=["muscle_force"]),
-    )
+    whole = pamrs.simulate(rig, **drive)
+    kept = pamrs.simulate(rig, **drive, record=["muscle_force"])
     np.testing.assert_array_equal(kept["muscle_force"], whole["muscle_force"])
 
 
 def test_a_run_of_some_channels_says_what_it_lacks():
-    run = pamrs.simulate(
-        pamrs.rigs.shoulder(), np.full(ROWS, 6.0), sample_time=SAMPLE, record=STATES
-    )
+    command = np.full(ROWS, 6.0)
+    run = pamrs.simulate(pamrs.rigs.shoulder(), command, sample_time=SAMPLE, record=STATES)
     assert list(run) == ["time", "valve_command", *STATES]
     for ask in (lambda: run.balance, run.summary):
         with pytest.raises(pamrs.ParameterError, match="record left out .*joint_torque"):

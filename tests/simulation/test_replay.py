@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs import cli
 from pamrs.channels import unit_of
-from pamrs.errors import ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import differences, replay
-from tests.tables import rows_of
+from tests.scripts import command
+from tests.simulation.refusals import refused
+from tests.tables import rows_of, text_of
 
 
 def write(path: Path, run: pamrs.Simulation, *names: str) -> Path:
@@ -34,28 +35,25 @@ def wave(rows: int, phase: float = 0.0) -> np.ndarray:
 
 def test_a_recording_of_named_blocks_is_replayed(tmp_path: Path) -> None:
     rig = pamrs.rigs.named("two_joint_arm")
-    run = pamrs.simulate(
-        rig,
+    volts, start = (
         {"elbow": wave(300) + 0.4, "wrist": wave(300, 1.0)},
-        sample_time=0.01,
-        initial={"muscle_pressure.elbow": 2e5},
+        {"muscle_pressure.elbow": 2e5},
     )
-    names = [
-        n
-        for n in run
-        if n.partition(".")[0]
-        in ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
-    ]
+    run = pamrs.simulate(rig, volts, sample_time=0.01, initial=start)
+    kept = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+    names = [n for n in run if n.partition(".")[0] in kept]
     recording = pamrs.load_recording(write(tmp_path / "run.csv", run, *names))
     again = replay(rig, recording)
-    np.testing.assert_allclose(
-        again["joint_angle.wrist"], run["joint_angle.wrist"], atol=2e-3
-    )  # slack at the start: when it becomes taut lies between samples of the pressure
+    # slack at the start: when it becomes taut lies between samples of the pressure
+    np.testing.assert_allclose(again["joint_angle.wrist"], run["joint_angle.wrist"], atol=2e-3)
     found = differences(again, recording)
     assert set(found) == {n for n in names if not n.startswith("valve_command")}
     assert found["joint_angle.elbow"] < 1e-4
     other = replay(rig.with_parameters({"link.hand.payload": 20.0}), recording)
     assert differences(other, recording)["joint_angle.elbow"] > 0.01
+    some = write(tmp_path / "some.csv", run, "valve_command.elbow", "joint_angle.elbow")
+    with pytest.raises(pamrs.RecordingError, match=r"no usable valve_command\.wrist"):
+        replay(rig, pamrs.load_recording(some))
 
 
 @pytest.mark.parametrize("alike", [True, False])
@@ -86,31 +84,20 @@ discharge_area = {{ value = 0.5, unit = "mm2" }}
     for name in (*channels, "temperature.a", "temperature.b"):
         np.testing.assert_allclose(again[name], run[name][100:], rtol=1e-9)
     assert differences(replay(rig, cut), cut)["muscle_pressure.b"] > 100.0
-    room = dict.fromkeys(("a", "b"), 293.15)
-    np.testing.assert_array_equal(
-        replay(rig, cut, temperatures=room)["muscle_pressure.a"],
-        replay(rig, cut)["muscle_pressure.a"],
+
+    def begun(**temperatures: float) -> pamrs.Simulation:
+        return replay(rig, cut, temperatures=temperatures)
+
+    room, told = begun(a=293.15, b=293.15), replay(rig, cut)
+    np.testing.assert_array_equal(room["muscle_pressure.a"], told["muscle_pressure.a"])
+    refused(
+        ("gas = 'energy_balance' is needed", lambda: begun(c=300.0)),
+        ("initial.temperature.a = 0 is not allowed: .* K", lambda: begun(a=0.0)),
+        ("initial.temperature.a = NaN is not allowed", lambda: begun(a=float("nan"))),
     )
-    for name, wrong, said in (
-        ("c", 300.0, "gas = 'energy_balance' is needed"),
-        ("a", 0.0, "initial.temperature.a = 0 is not allowed: .* K"),
-        ("a", float("nan"), "initial.temperature.a = NaN is not allowed"),
-    ):
-        with pytest.raises(ParameterError, match=said):
-            replay(rig, cut, temperatures={name: wrong})
     warm = pamrs.simulate(rig, sample_time=0.01, duration=0.1, initial={"temperature.b": 350.0})
     assert warm["temperature.b"][0] == pytest.approx(350.0)
     assert warm["temperature.a"][0] == pytest.approx(293.15)
-
-
-def test_what_a_replay_needs_is_named(tmp_path: Path) -> None:
-    rig = pamrs.rigs.named("two_joint_arm")
-    run = pamrs.simulate(rig, {"elbow": 6.0, "wrist": 5.0}, sample_time=0.01, duration=1.0)
-    recording = pamrs.load_recording(
-        write(tmp_path / "run.csv", run, "valve_command.elbow", "joint_angle.elbow")
-    )
-    with pytest.raises(pamrs.RecordingError, match=r"no usable valve_command\.wrist"):
-        replay(rig, recording)
 
 
 def test_pressures_move_a_joint_that_nothing_feeds(tmp_path: Path) -> None:
@@ -120,9 +107,8 @@ def test_pressures_move_a_joint_that_nothing_feeds(tmp_path: Path) -> None:
     pressure = 2e5 + 1e5 * np.sin(0.02 * np.arange(200))
     run = pamrs.simulate(rig, sample_time=0.01, pressure=pressure)
     np.testing.assert_allclose(run["muscle_pressure"], pressure, atol=1e-6)
-    recording = pamrs.load_recording(
-        write(tmp_path / "run.csv", run, "muscle_pressure", "joint_angle")
-    )
+    file = write(tmp_path / "run.csv", run, "muscle_pressure", "joint_angle")
+    recording = pamrs.load_recording(file)
     again = replay(rig, recording)
     np.testing.assert_allclose(again["joint_angle"], run["joint_angle"], atol=1e-7)
     assert set(differences(again, recording)) == {"joint_angle"}
@@ -130,38 +116,19 @@ def test_pressures_move_a_joint_that_nothing_feeds(tmp_path: Path) -> None:
 
 def test_steps_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "run.csv"
-    words = [
-        "simulate",
-        "two_joint_arm",
-        "--hold",
-        "valve_command.elbow = 6 V, 5 V @ 0.5 s",
-        "--hold",
-        "valve_command.wrist = 5000 mV",
-    ]
-    assert (
-        cli.main(
-            [
-                *words,
-                "--initial",
-                "muscle_pressure.wrist = 1 bar",
-                "--duration",
-                "1 s",
-                "--output",
-                str(out),
-            ]
-        )
-        == 0
-    )
-    said = capsys.readouterr().out
+    holds = ("valve_command.elbow = 6 V, 5 V @ 0.5 s", "valve_command.wrist = 5000 mV")
+    words = [word for hold in holds for word in ("--hold", hold)]
+    words += ["--initial", "muscle_pressure.wrist = 1 bar", "--duration", "1 s"]
+    code, said, _ = command(capsys, "simulate", "two_joint_arm", *words, "--output", out)
+    assert code == 0
     assert "muscle_pressure.wrist: from" in said
     assert "g supplied" in said
     head, *rows = out.read_text(encoding="utf-8").splitlines()
     assert "energy_supplied [J]" in head.split(",")
     assert len(rows) == 201
     table = np.array([[float(v) for v in row.split(",")] for row in rows])
-    command = table[:, head.split(",").index("valve_command.elbow [V]")]
-    assert (command[:100] == 6.0).all()
-    assert (command[100:] == 5.0).all()
+    volts = table[:, head.split(",").index("valve_command.elbow [V]")]
+    assert volts.tolist() == [6.0] * 100 + [5.0] * 101
 
 
 @pytest.mark.parametrize(
@@ -171,8 +138,9 @@ def test_steps_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
 def test_wrong_steps_are_named(
     words: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["simulate", "two_joint_arm", *words, "--output", str(tmp_path / "x.csv")]) == 2
-    err = capsys.readouterr().err
+    out = tmp_path / "x.csv"
+    code, _, err = command(capsys, "simulate", "two_joint_arm", *words, "--output", out)
+    assert code == 2
     assert message in err.splitlines()[-1]
 
 
@@ -195,20 +163,34 @@ def test_a_controller_is_asked_at_its_own_rate() -> None:
             one.control(update, **{"duration": 0.1, "period": 0.01, name: value})
 
 
-def test_a_case_of_named_blocks_that_lacks_a_command_is_refused_by_its_name(tmp_path: Path) -> None:
-    rig = pamrs.rigs.named("antagonistic_joint")
+PAIR = ("valve_command.flexor", "muscle_pressure.flexor", "joint_angle.elbow")
+
+
+@pytest.mark.parametrize(
+    ("rig", "drive", "names", "told"),
+    [
+        (
+            pamrs.rigs.named("antagonistic_joint"),
+            {"valve_command": {"flexor": wave(300), "extensor": 10.0 - wave(300)}},
+            PAIR,
+            r"no channel valve_command\.extensor",
+        ),
+        (
+            parse_rig(text_of(__file__, "hanging")),
+            {"duration": 2.0, "initial": {"muscle_pressure": 4e5, "length": 0.25}},
+            ("muscle_pressure",),
+            r"measure muscle_pressure, length$",
+        ),
+    ],
+    ids=["pair", "mass"],
+)
+def test_a_case_that_lacks_a_channel_is_refused_with_what_to_measure(
+    tmp_path: Path, rig: pamrs.Rig, drive: dict[str, Any], names: tuple[str, ...], told: str
+) -> None:
     rig.to_toml(tmp_path / "rig.toml")
-    run = pamrs.simulate(rig, {"flexor": wave(300), "extensor": 10.0 - wave(300)}, sample_time=0.01)
-    write(
-        tmp_path / "run.csv",
-        run,
-        "valve_command.flexor",
-        "muscle_pressure.flexor",
-        "joint_angle.elbow",
-    )
-    case = (
-        'schema = "pamrs.case/1"\nrig = "rig.toml"\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
-    )
-    (tmp_path / "case.toml").write_text(case, encoding="utf-8")
-    with pytest.raises(pamrs.DiagnosisError, match=r"no channel valve_command\.extensor"):
+    write(tmp_path / "run.csv", pamrs.simulate(rig, sample_time=0.01, **drive), *names)
+    case = 'schema = "pamrs.case/1"\nrig = "rig.toml"\n'
+    recording = '[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
+    (tmp_path / "case.toml").write_text(case + recording, encoding="utf-8")
+    with pytest.raises(pamrs.DiagnosisError, match=told):
         pamrs.diagnose(tmp_path)

@@ -55,18 +55,12 @@ def test_every_packaged_rig_is_what_simulate_gives(name):
 
 def test_rigs_with_effects_run_too():
     rig = pamrs.rigs.shoulder().with_effect("leak_muscle", {"conductance": 2e-9})
-    payload = np.array([2.0, 9.0])
-    run = pamrs.simulate_batch(
-        rig,
-        np.full(ROWS, 6.0),
-        sample_time=SAMPLE,
-        parameters={"arm.payload": payload},
-        record=["muscle_pressure"],
-    )
+    payload, volts = np.array([2.0, 9.0]), np.full(ROWS, 6.0)
+    options = {"parameters": {"arm.payload": payload}, "record": ["muscle_pressure"]}
+    run = pamrs.simulate_batch(rig, volts, sample_time=SAMPLE, **options)
     for k, mass in enumerate(payload):
-        alone = pamrs.simulate(
-            rig.with_parameters({"arm.payload": mass}), np.full(ROWS, 6.0), sample_time=SAMPLE
-        )
+        loaded = rig.with_parameters({"arm.payload": mass})
+        alone = pamrs.simulate(loaded, volts, sample_time=SAMPLE)
         np.testing.assert_array_equal(run["muscle_pressure"][k], alone["muscle_pressure"])
 
 
@@ -79,24 +73,19 @@ def test_rigs_with_effects_run_too():
 )
 def test_any_plant_is_the_one_that_simulate_gives(payload, dead_volume, command, angle):
     rig = pamrs.rigs.shoulder()
-    n = len(payload)
+    k = len(payload) // 2
     signal = np.where(np.arange(61) < 30, command, 5.0)
+    drive = {"sample_time": SAMPLE, "initial": {"joint_angle": angle}}
     run = pamrs.simulate_batch(
         rig,
         signal,
-        sample_time=SAMPLE,
+        **drive,
         parameters={"arm.payload": payload, "chamber.dead_volume": dead_volume},
-        initial={"joint_angle": angle},
         record=["joint_angle", "muscle_pressure", "mass_supplied"],
         reduce={"peak": ("peak", "joint_rate"), "end": ("final", "joint_angle")},
     )
-    k = n // 2
-    alone = pamrs.simulate(
-        rig.with_parameters({"arm.payload": payload[k], "chamber.dead_volume": dead_volume}),
-        signal,
-        sample_time=SAMPLE,
-        initial={"joint_angle": angle},
-    )
+    own = rig.with_parameters({"arm.payload": payload[k], "chamber.dead_volume": dead_volume})
+    alone = pamrs.simulate(own, signal, **drive)
     assert apart(run["joint_angle"][k], alone["joint_angle"]) < 1e-8
     assert apart(run["muscle_pressure"][k], alone["muscle_pressure"]) < 1e-7
     assert abs(run["mass_supplied"][k][-1] - alone["mass_supplied"][-1]) < 1e-10
@@ -120,14 +109,9 @@ def test_a_plant_that_leaves_the_model_ends_as_it_would_alone():
     rig = pamrs.rigs.shoulder().with_parameters({"joint.stop_stiffness": 5.0})
     command = np.full(ROWS, 6.0)
     thrown = np.array([0.0, -80.0, 0.0, -90.0])
-    run = pamrs.simulate_batch(
-        rig,
-        command,
-        sample_time=SAMPLE,
-        initial={"joint_rate": thrown},
-        record=["joint_angle"],
-        reduce={"end": ("final", "joint_angle")},
-    )
+    kept = {"record": ["joint_angle"], "reduce": {"end": ("final", "joint_angle")}}
+    drive = {"sample_time": SAMPLE, "initial": {"joint_rate": thrown}}
+    run = pamrs.simulate_batch(rig, command, **drive, **kept)
     assert run.failed.tolist() == [False, True, False, True]
     for k, rate in enumerate(thrown):
         start = {"joint_rate": rate}
@@ -145,19 +129,11 @@ def test_a_plant_that_leaves_the_model_ends_as_it_would_alone():
 
 def test_squared_error_takes_a_reference():
     rig = pamrs.rigs.shoulder()
-    wanted = np.linspace(0.3, 1.0, ROWS)
-    run = pamrs.simulate_batch(
-        rig,
-        np.full(ROWS, 6.0),
-        sample_time=SAMPLE,
-        n=2,
-        record=["joint_angle"],
-        reduce={
-            "ise": ("squared_error", "joint_angle", wanted),
-            "about": ("squared_error", "joint_angle", 0.5),
-        },
-    )
-    for name, reference in (("ise", wanted), ("about", 0.5)):
+    references = {"ise": np.linspace(0.3, 1.0, ROWS), "about": 0.5}
+    asked = {name: ("squared_error", "joint_angle", one) for name, one in references.items()}
+    options = {"n": 2, "record": ["joint_angle"], "reduce": asked}
+    run = pamrs.simulate_batch(rig, np.full(ROWS, 6.0), sample_time=SAMPLE, **options)
+    for name, reference in references.items():
         squares = (run["joint_angle"][0] - reference) ** 2
         assert run.reduced[name][0] == pytest.approx(np.trapezoid(squares, dx=SAMPLE), rel=1e-12)
 

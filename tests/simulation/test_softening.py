@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.prepare import available_blocks
 from pamrs.rig import parse_rig
+from tests.simulation.refusals import refused
 
 SOFT, WARM = 4e-3, 313.15
 CONTRACTIONS = np.array([-0.02, 0.0, 0.1, 0.2])
@@ -47,52 +45,25 @@ def test_a_run_is_that_of_softer_moduli() -> None:
         size = float(np.abs(other[name]).max())
         np.testing.assert_allclose(one[name], other[name], rtol=0.0, atol=1e-11 * size)
     assert one["joint_angle"].max() > cold["joint_angle"].max()
-    batch = pamrs.Batch([warm, plain], sample_time=0.005)
-    assert batch.side_by_side.all()
-    rows = np.array([batch.step(float(u))["joint_angle"] for u in volts[:-1]])
-    np.testing.assert_array_equal(rows.T, [one["joint_angle"][1:], cold["joint_angle"][1:]])
-
-
-def test_a_rig_keeps_it_and_an_arm_is_fitted_by_it() -> None:
-    lines = (
-        'softening = { value = 0.4, unit = "%/K", tol = 0.1 }\n'
-        'temperature = { value = 40, unit = "degC" }\n'
-    )
-    text = pamrs.rigs.shoulder().to_toml_text()
-    rig = parse_rig(text.replace("[muscle]\n", "[muscle]\n" + lines))
-    assert rig.parameter("muscle.softening").value == pytest.approx(SOFT)
-    assert rig.parameter("muscle.softening").tol == pytest.approx(1e-3)
-    again = parse_rig(rig.to_toml_text(comments=False))
-    assert again.model == rig.model
-    assert json.loads(again.to_json())["muscles"][0]["muscle"]["temperature"] == WARM
-    channels = ("supply_pressure", "muscle_pressure", "joint_angle", "valve_command")
-    arm = available_blocks(rig, channels)[-1]
-    assert {"muscle.softening", "muscle.temperature"} <= arm.parameters
 
 
 def test_what_cannot_be_is_refused_by_name() -> None:
     rig = pamrs.rigs.shoulder()
-    with pytest.raises(pamrs.PamrsError, match=r"muscle.softening = 0.2 .*-0.1 to 0.1"):
-        rig.with_parameters({"muscle.softening": 0.2})
-    refused = r"muscle.softening = 0.05 .*a size of at most 0.025 1/K.* 40 K above muscle.reference"
-    soft = {"muscle.softening": 0.05, "muscle.temperature": 333.15}
-    with pytest.raises(pamrs.PamrsError, match=refused):
-        pamrs.simulate(rig.with_parameters(soft), [5.0, 5.0], sample_time=0.01)
-    with pytest.raises(pamrs.PamrsError, match=refused):
-        rig.muscle.replace(softening=0.05, temperature=333.15)
+    told = r"muscle.softening = 0.05 .*a size of at most 0.025 1/K.* 40 K above muscle.reference"
+    soft = rig.with_parameters({"muscle.softening": 0.05, "muscle.temperature": 333.15})
     lines = (
         'softening = { value = 0.05, unit = "1/K" }\ntemperature = { value = 60, unit = "degC" }\n'
     )
-    with pytest.raises(pamrs.RigError, match=refused):
-        parse_rig(rig.to_toml_text().replace("[muscle]\n", "[muscle]\n" + lines))
-    table = pamrs.Muscle.from_law(
-        lambda p, e: 1e-3 * p * (1.0 - 3.0 * e),
-        max_pressure=6e5,
-        contraction=(0.0, 0.25),
-        rest_length=0.2,
-        rest_diameter=0.02,
-        braid_angle=1.25,
-        wall_thickness=1e-3,
+    text = rig.to_toml_text().replace("[muscle]\n", "[muscle]\n" + lines)
+    law = {"max_pressure": 6e5, "contraction": (0.0, 0.25), "rest_length": 0.2}
+    braid = {"rest_diameter": 0.02, "braid_angle": 1.25, "wall_thickness": 1e-3}
+    table = pamrs.Muscle.from_law(lambda p, e: 1e-3 * p * (1.0 - 3.0 * e), **law, **braid)
+    none = r"muscle.softening.*\"map\" has no such parameter"
+    refused(
+        ("softening = 0.2 .*-0.1 to 0.1", lambda: rig.with_parameters({"muscle.softening": 0.2})),
+        (told, lambda: pamrs.simulate(soft, [5.0, 5.0], sample_time=0.01)),
+        (told, lambda: rig.muscle.replace(softening=0.05, temperature=333.15)),
+        (told, lambda: parse_rig(text)),
+        (none, lambda: table.replace(softening=1e-3)),
+        by=pamrs.PamrsError,
     )
-    with pytest.raises(pamrs.PamrsError, match=r"muscle.softening.*\"map\" has no such parameter"):
-        table.replace(softening=1e-3)

@@ -41,16 +41,9 @@ def late(time: Array, gas: Array, lag: float) -> Array:
     """Reading [K] of a thermometer that lags so much [s] behind a gas (n,): `T y' = gas - y`
     (Doebelin, Measurement Systems, ch. 8), from equilibrium.
     """
-    curve = CubicSpline(time, gas)
-    found = solve_ivp(
-        lambda t, y: (curve(t) - y) / lag,
-        (0.0, float(time[-1])),
-        gas[:1],
-        t_eval=time,
-        rtol=1e-9,
-        atol=1e-9,
-    )
-    return np.asarray(found.y[0])
+    curve, closest = CubicSpline(time, gas), {"rtol": 1e-9, "atol": 1e-9}
+    law, span = (lambda t, y: (curve(t) - y) / lag), (0.0, float(time[-1]))
+    return np.asarray(solve_ivp(law, span, gas[:1], t_eval=time, **closest).y[0])
 
 
 def test_a_thermometer_reads_the_gas_late() -> None:
@@ -59,12 +52,13 @@ def test_a_thermometer_reads_the_gas_late() -> None:
     told = network.simulate(json.loads(rig.to_json()), {}, STEP, rows=ROWS)
     gas = (told["muscle_pressure"] + AMBIENT) * VOLUME / (told["air_mass"] * GAS_CONSTANT)
     assert gas.min() < 270.0
-    plain = pamrs.simulate(rig, duration=STEP * (ROWS - 1), sample_time=STEP, step=1e-3)
+    times = {"duration": STEP * (ROWS - 1), "sample_time": STEP, "step": 1e-3}
+    plain = pamrs.simulate(rig, **times)
     np.testing.assert_allclose(plain["temperature"], gas, atol=1e-4)
     lag = 0.4
     read = late(told["time"], gas, lag)
     slow = rig.with_effect("thermometer_lag", {"time_constant": lag})
-    run = pamrs.simulate(slow, duration=STEP * (ROWS - 1), sample_time=STEP, step=1e-3)
+    run = pamrs.simulate(slow, **times)
     assert np.abs(read - gas).max() > 5.0
     np.testing.assert_allclose(run["temperature"], read, atol=2e-3)
     np.testing.assert_array_equal(run["muscle_pressure"], plain["muscle_pressure"])

@@ -19,29 +19,29 @@ def run(**changes: float) -> pamrs.Simulation:
     return pamrs.simulate(rig.with_parameters(values), FILL, sample_time=0.005, initial=START)
 
 
+def wide() -> np.ndarray:
+    """Pressure of the plain shoulder."""
+    start = {"muscle_pressure": 1e5}
+    run = pamrs.simulate(pamrs.rigs.shoulder(), FILL, sample_time=0.005, initial=start)
+    return run["muscle_pressure"]
+
+
 def test_the_inlet_falls_while_the_valve_fills_and_comes_back() -> None:
     found = run()
-    inlet, tank = found["muscle_pressure.feed"], found["supply_pressure"]
-    fall = tank - inlet
+    fall = found["supply_pressure"] - found["muscle_pressure.feed"]
     assert 1e5 < fall[TIME < 0.8].max() < 4e5
     assert abs(fall[-1]) < 2e3
-    wide = pamrs.simulate(
-        pamrs.rigs.shoulder(), FILL, sample_time=0.005, initial={"muscle_pressure": 1e5}
-    )
     late = int(0.2 / 0.005)
-    assert found["muscle_pressure.muscle"][late] < 0.97 * wide["muscle_pressure"][late]
+    assert found["muscle_pressure.muscle"][late] < 0.97 * wide()[late]
 
 
 def test_without_restriction_it_is_the_plain_shoulder() -> None:
     """The wider the line and the smaller the chamber, the nearer."""
-    wide = pamrs.simulate(
-        pamrs.rigs.shoulder(), FILL, sample_time=0.005, initial={"muscle_pressure": 1e5}
-    )
-    apart = []
+    plain, apart = wide(), []
     for area, volume in ((4e-5, 2e-5), (1.6e-4, 5e-6)):
         found = run(line__feed__discharge_area=area, chamber__feed__dead_volume=volume)
-        difference = found["muscle_pressure.muscle"] - wide["muscle_pressure"]
-        apart.append(float(np.abs(difference).max() / np.ptp(wide["muscle_pressure"])))
+        difference = found["muscle_pressure.muscle"] - plain
+        apart.append(float(np.abs(difference).max() / np.ptp(plain)))
     assert apart[1] < 0.2 * apart[0]
     assert apart[1] < 2e-3
 
@@ -51,13 +51,10 @@ def test_a_narrow_line_chokes_and_decides_the_flow() -> None:
     area = 5e-7
     found = run(line__feed__discharge_area=area)
     late = (TIME > 0.6) & (TIME < 0.8)
-    assert np.all(
-        found["muscle_pressure.feed"][late] + 101325.0
-        < 0.5 * (found["supply_pressure"][late] + 101325.0)
-    )
-    supplied = found["mass_supplied"]
-    flow = np.gradient(supplied, TIME)[late]
-    choked = 0.68473 * area * (found["supply_pressure"][late] + 101325.0) / (287.05 * 293.15) ** 0.5
+    tank = found["supply_pressure"][late] + 101325.0
+    assert np.all(found["muscle_pressure.feed"][late] + 101325.0 < 0.5 * tank)
+    flow = np.gradient(found["mass_supplied"], TIME)[late]
+    choked = 0.68473 * area * tank / (287.05 * 293.15) ** 0.5
     np.testing.assert_allclose(flow, choked, rtol=1e-4)
 
 

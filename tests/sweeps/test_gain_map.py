@@ -17,21 +17,17 @@ GAINS = {"kp": [0.5, 2.0], "ki": [0.5, 1.0, 1.5]}
 OVER = {**{f"gain.{name}": values for name, values in GAINS.items()}, "arm.payload": [5.0, 9.0]}
 
 
-def test_a_map_in_chunks_is_that_of_one_batch(tmp_path):
-    rig = pamrs.rigs.shoulder()
+@pytest.fixture
+def kept(tmp_path):
+    return {"store": tmp_path / "out.zarr", "progress": False}
+
+
+def test_a_map_in_chunks_is_that_of_one_batch(kept):
+    rig, law = pamrs.rigs.shoulder(), control.PID
     with ThreadPoolExecutor(2) as pool:
-        found = sweeps.gain_map(
-            rig,
-            control.PID,
-            OVER,
-            LIFT,
-            duration=0.3,
-            chunk=4,
-            store=tmp_path / "out.zarr",
-            executor=pool,
-            progress=False,
-        )
-    one = tuning.gain_map(rig, control.PID, GAINS, LIFT, payloads=OVER["arm.payload"], duration=0.3)
+        kept |= {"duration": 0.3, "chunk": 4, "executor": pool}
+        found = sweeps.gain_map(rig, law, OVER, LIFT, **kept)
+    one = tuning.gain_map(rig, law, GAINS, LIFT, payloads=OVER["arm.payload"], duration=0.3)
     for name in ("rms", "squared_error", "curvature"):
         expected = np.moveaxis(getattr(one, name), 0, -1)
         np.testing.assert_array_equal(found[name].values, expected, err_msg=name)
@@ -39,10 +35,10 @@ def test_a_map_in_chunks_is_that_of_one_batch(tmp_path):
     assert found["squared_error"].attrs["units"] == "rad2 s"
 
 
-def test_fixed_gains_and_geometry_belong_to_a_map(tmp_path):
+def test_fixed_gains_and_geometry_belong_to_a_map(kept):
     rig = pamrs.rigs.shoulder()
     over = {"gain.ki": [0.5, 1.0], "joint.upper_offset": [0.02, 0.027432]}
-    arguments = {"duration": 0.1, "store": tmp_path / "out.zarr", "progress": False}
+    arguments = {"duration": 0.1, **kept}
     found = sweeps.gain_map(rig, partial(control.PID, 1.0), over, LIFT, **arguments)
     other = rig.with_parameters({"joint.upper_offset": 0.02})
     alone = control.sweep(other, control.PID(1.0, np.array([1.0])), LIFT, 0.1, n=1)
@@ -59,20 +55,14 @@ def test_fixed_gains_and_geometry_belong_to_a_map(tmp_path):
         (control.PID, 3.0, "trajectory is a float"),
     ],
 )
-def test_what_no_other_process_finds_is_refused(tmp_path, controller, trajectory, message):
+def test_what_no_other_process_finds_is_refused(kept, controller, trajectory, message):
+    rig, over = pamrs.rigs.shoulder(), {"gain.kp": [1.0]}
     with pytest.raises(pamrs.ParameterError, match=message):
-        sweeps.gain_map(
-            pamrs.rigs.shoulder(),
-            controller,
-            {"gain.kp": [1.0]},
-            trajectory,
-            store=tmp_path / "out.zarr",
-        )
+        sweeps.gain_map(rig, controller, over, trajectory, **kept)
 
 
-def test_a_gain_without_its_prefix_and_a_length_are_told(tmp_path):
+def test_a_gain_without_its_prefix_and_a_length_are_told(tmp_path, kept):
     rig = pamrs.rigs.hanging_mass()
-    kept = {"store": tmp_path / "out.zarr", "progress": False}
     with pytest.raises(pamrs.ParameterError, match="'kp': a gain is called 'gain.kp'"):
         sweeps.gain_map(rig, control.PID, {"kp": [1.0]}, LIFT, **kept)
     lift = trajectories.step(0.27, 0.25, duration=0.2)

@@ -92,23 +92,22 @@ for fatal in [*instants, None]:
 """
 
 
+def started(script: str, *words: object, errors: int) -> subprocess.Popen[str]:
+    """A script in a process of its own that finds this package and its tests."""
+    root = str(Path(__file__).parents[2])
+    path = os.pathsep.join([root, *filter(None, sys.path)])
+    command = [sys.executable, "-c", script, *map(str, words)]
+    env = {**os.environ, "PYTHONPATH": path}
+    return subprocess.Popen(command, cwd=root, env=env, stderr=errors, text=True)
+
+
 def run(folder: Path, instants: list[tuple[int, str]]) -> list[list[str]]:
     """The chunks that each process has worked out."""
-    root = Path(__file__).parents[2]
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, str(folder), json.dumps(instants)],
-        cwd=root,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(root), *filter(None, sys.path)])},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr
-    names = [*(f"notes {k}" for k in range(len(instants))), "notes last"]
-    return [
-        (folder / name).read_text().splitlines() if (folder / name).exists() else []
-        for name in names
-    ]
+    process = started(SCRIPT, folder, json.dumps(instants), errors=subprocess.PIPE)
+    _, told = process.communicate(timeout=120)
+    assert process.returncode == 0, told
+    notes = [folder / f"notes {k}" for k in (*range(len(instants)), "last")]
+    return [note.read_text().splitlines() if note.exists() else [] for note in notes]
 
 
 def test_a_sweep_killed_at_any_instant_goes_on_where_it_was(tmp_path):
@@ -148,14 +147,8 @@ def run_chunk(task):
 _running.run_chunk = run_chunk
 small(sys.argv[1], executor=ThreadPoolExecutor(2), chunk=1)
 """
-    path, root = tmp_path / "out.zarr", Path(__file__).parents[2]
-    search = os.pathsep.join([str(root), *filter(None, sys.path)])
-    process = subprocess.Popen(
-        [sys.executable, "-c", script, str(path)],
-        cwd=root,
-        env={**os.environ, "PYTHONPATH": search},
-        stderr=subprocess.DEVNULL,
-    )
+    path = tmp_path / "out.zarr"
+    process = started(script, path, errors=subprocess.DEVNULL)
     journal, limit = path / ".pamrs" / "journal", time.monotonic() + 60
     while not (journal.exists() and len(journal.read_bytes().splitlines()) >= 5):
         assert time.monotonic() < limit

@@ -16,7 +16,7 @@ from pamrs.control._groups import highest_pressure, joints_of, lengths_of
 from pamrs.control._model import ArmModel
 from pamrs.control._protocol import Controller, Measurement, Reference, Value
 from pamrs.control._sampled import SampledController
-from pamrs.control._torque import TorqueModel, active_groups, joint_torque, rest_length_of
+from pamrs.control._torque import TorqueModel, joint_torque, rest_length_of
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -91,14 +91,12 @@ class LoadModel(ArmModel):
                 f"torque = {torque!r} is not allowed for rig {rig.name!r}, where a mass hangs: "
                 "'full' is needed, or a model of the pull"
             )
-        rest, groups = rest_length_of(rig), active_groups(rig, active)
+        rest = rest_length_of(rig)
         return cls(
             inertia=load["mass"],
             viscous=load["viscous"],
             weight=load["mass"] * load["gravity"],
-            torque=joint_torque(rig, name, torque, groups, False)
-            if isinstance(torque, str)
-            else torque,
+            torque=joint_torque(rig, name, torque, active),
             pressure_limit=highest_pressure(rig) if pressure_limit is None else pressure_limit,
             angle_range=(rest - float(load["max_length"]), rest - float(load["min_length"])),
             rest_length=rest,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 from pamrs._checks import finite, refused, rising
 from pamrs.control._groups import highest_pressure, joints_of
 from pamrs.control._protocol import Value
-from pamrs.control._torque import TorqueModel, active_groups, joint_torque
+from pamrs.control._torque import TorqueModel, drive_limits, joint_torque
 from pamrs.control._values import as_value, positive_gain, sin
 from pamrs.errors import ParameterError
 
@@ -114,11 +114,7 @@ class JointModel(abc.ABC):
 
     def limits(self, angle: Value) -> tuple[Value, Value]:
         """Least and largest drive that may be asked for at an angle [Pa]."""
-        of_torque = getattr(self.torque, "limits", None)
-        if of_torque is None:
-            return 0.0, self.pressure_limit
-        found: tuple[Value, Value] = of_torque(angle, self.pressure_limit)
-        return found
+        return drive_limits(self.torque, angle, self.pressure_limit)
 
     def pressure(self, torque: Value, angle: Value) -> Value:
         """Drive [Pa] that gives a torque [N m] at an angle [rad], without limits (4.12): with one
@@ -224,13 +220,13 @@ class ArmModel(JointModel):
                 f"rig {rig.name!r} has an arm of kind {arm['kind']!r} with {len(names)} joints: it "
                 "has a PlanarArmModel, and a RigModel takes either"
             )
-        joint, groups = rig.tables("joint")[names[0]], active_groups(rig, active)
+        joint = rig.tables("joint")[names[0]]
         weight, tilt = _weight(arm)
         return cls(
             inertia=arm["inertia"] + arm["payload"] * arm["length"] ** 2,
             viscous=arm["viscous"],
             weight=weight,
-            torque=joint_torque(rig, names[0], torque, groups, active is None),
+            torque=joint_torque(rig, names[0], torque, active),
             pressure_limit=highest_pressure(rig) if pressure_limit is None else pressure_limit,
             angle_range=(joint["min_angle"], joint["max_angle"]),
             tilt=tilt,

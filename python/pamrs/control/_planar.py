@@ -25,7 +25,7 @@ from pamrs._checks import finite, refused
 from pamrs.control._groups import highest_pressure, joints_of
 from pamrs.control._model import JointModel, Parameter
 from pamrs.control._protocol import Value
-from pamrs.control._torque import TorqueModel, active_groups, joint_torque
+from pamrs.control._torque import TorqueModel, drive_limits, joint_torque
 from pamrs.control._values import positive_gain
 from pamrs.errors import ParameterError
 
@@ -60,7 +60,7 @@ class JointTorques:
     def limits(self, angle: Value, pressure_limit: float) -> tuple[Value, Value]:
         """Least and largest drive at angles [Pa]."""
         each = [
-            torque.limits(q, pressure_limit) if hasattr(torque, "limits") else (0.0, pressure_limit)
+            drive_limits(torque, q, pressure_limit)
             for torque, q in zip(self.torques, self.of_each(angle), strict=True)
         ]
         return _rows([low for low, _ in each], angle), _rows([high for _, high in each], angle)
@@ -161,30 +161,27 @@ class PlanarArmModel(JointModel):
         ParameterError
             As :meth:`pamrs.control.ArmModel.from_rig`.
         """
-        names, groups = joints_of(rig), active_groups(rig, active)
+        names = joints_of(rig)
         links, tables = list(rig.tables("link").values()), rig.tables("joint")
         if not links:
             raise ParameterError(f"rig {rig.name!r} has no [link]: it has an ArmModel")
         coupling, moment = _assembled(links)
-        gravity = float(next(iter(rig.tables("arm").values()))["gravity"])
-        ends = [
-            np.array([float(tables[name][end]) for name in names])
-            for end in ("min_angle", "max_angle")
-        ]
-        springs = [
-            np.array([float(tables[name].get(key, 0.0)) for name in names])
-            for key in ("stiffness", "spring_angle")
-        ]
+        arm = next(iter(rig.tables("arm").values()))
+
+        def of_joints(key: str) -> Array:
+            return np.array([float(tables[name].get(key, 0.0)) for name in names])
+
+        stiffness = of_joints("stiffness")
         return cls(
             names,
             coupling,
-            moment * gravity,
+            moment * float(arm["gravity"]),
             np.array([float(link["viscous"]) for link in links]),
-            JointTorques([joint_torque(rig, name, "full", groups, False) for name in names]),
+            JointTorques([joint_torque(rig, name, "full", active) for name in names]),
             highest_pressure(rig) if pressure_limit is None else pressure_limit,
-            (ends[0], ends[1]),
-            float(next(iter(rig.tables("arm").values())).get("base_angle", 0.0)),
-            (springs[0], springs[1]) if np.any(springs[0]) else None,
+            (of_joints("min_angle"), of_joints("max_angle")),
+            float(arm.get("base_angle", 0.0)),
+            (stiffness, of_joints("spring_angle")) if np.any(stiffness) else None,
         )
 
     def replace(self, **changes: Any) -> PlanarArmModel:
@@ -298,14 +295,9 @@ class PlanarArmModel(JointModel):
             for j in range(i + 1, n):
                 c = cosine[i] * cosine[j] + sine[i] * sine[j]
                 s = sine[i] * cosine[j] - cosine[i] * sine[j]
-                columns.append(
-                    on_links(
-                        {
-                            i: c * push[j] + s * turn[j] * wanted[j],
-                            j: c * push[i] - s * turn[i] * wanted[i],
-                        }
-                    )
-                )
+                on_i = c * push[j] + s * turn[j] * wanted[j]
+                on_j = c * push[i] - s * turn[i] * wanted[i]
+                columns.append(on_links({i: on_i, j: on_j}))
         own = np.broadcast_to(wanted_rate, shape).reshape(n, -1)
         for i in range(n):
             friction = still.copy()

@@ -30,6 +30,7 @@ from pamrs.control._protocol import (
     Reference,
     Value,
     check_answers_pressure,
+    keywords_of,
 )
 from pamrs.control._rig_model import RigModel
 from pamrs.control._sampled import Restorer, SampledController, Stateful
@@ -81,6 +82,11 @@ class _Law(Stateful):
         if batch != -1 and own not in allowed:
             rows = f"{self.joints * plants} rows are needed for {self.joints} joints"
             raise refused(f"{where}.batch", own, f"{rows} of {plants} plants")
+
+
+def _command_of(group: Group) -> str:
+    """Name of the command that fills and vents a group, ``valve_command.flexor``."""
+    return dotted(group.feed.input, group.feed.name)
 
 
 class _Named(Stateful):
@@ -189,8 +195,11 @@ class RigController(SampledController):
         self._channels = self._named_channels()
         #: Channels of the joints that are tracked, base first.
         self.tracked = tuple(self._channels[0])
-        self._vented = [(group, self._opened(group)) for group in model.vented]
-        self._open = [self._opened(group) for group in model.groups]
+        # the lowest command opens a group to the ambient
+        lowest = {name: low for name, (_, low, _) in self.command_ranges.items()}
+        self._vented = {name: lowest[name] for name in map(_command_of, model.vented)}
+        self._called = [_command_of(group) for group in model.groups]
+        self._open = [lowest[name] for name in self._called]
         self._before = Restorer(self)
         self.reset()
 
@@ -238,13 +247,12 @@ class RigController(SampledController):
 
     def _named_channels(self) -> tuple[list[str], list[str], list[str], list[str | None]]:
         model = self.model
-        angles = [dotted("joint_angle", name) for name in model.joints]
-        rates = [dotted("joint_rate", name) for name in model.joints]
-        if self._rest_length is not None:
-            angles, rates = ["length"], ["length_rate"]
+        angles, rates = ["length"], ["length_rate"]
+        if self._rest_length is None:
+            angles = [dotted("joint_angle", name) for name in model.joints]
+            rates = [dotted("joint_rate", name) for name in model.joints]
         pressures = [dotted("muscle_pressure", group.chamber) for group in model.groups]
-        supplies = [group.feed.source for group in model.groups]
-        return angles, rates, pressures, supplies
+        return angles, rates, pressures, [group.feed.source for group in model.groups]
 
     @property
     def command_ranges(self) -> dict[str, tuple[float, float, float]]:
@@ -259,7 +267,7 @@ class RigController(SampledController):
                 valve = self.model.rig.tables("valve")[group.feed.name]
                 rest, half = float(valve["null_voltage"]), float(valve["half_range"])
                 low, high = rest - half, rest + half
-            found[dotted(group.feed.input, group.feed.name)] = (rest, low, high)
+            found[_command_of(group)] = (rest, low, high)
         return found
 
     # ------------------------------------------------------------------ used
@@ -356,10 +364,9 @@ class RigController(SampledController):
             vented = idle[group.chamber]
             if vented is not False:
                 command = chosen(vented, self._open[i], command)
-            self._answer(answers, group, command)
-        for group, command in self._vented:
-            self._answer(answers, group, self._sized_for_batch(command))
-        return answers
+            answers[self._called[i]] = command
+        answers |= {name: self._sized_for_batch(low) for name, low in self._vented.items()}
+        return keywords_of(answers)
 
     def _shared(
         self,
@@ -515,18 +522,6 @@ class RigController(SampledController):
         known, place = core_rig(rig).states, dotted("chamber", chamber)
         lines = [name for name, ports in rig.ports("line").items() if ports["to"] == place]
         return [name for name in (dotted("line_pressure", n) for n in lines) if name in known]
-
-    def _opened(self, group: Group) -> float:
-        """The command that opens a group to the ambient: the lowest one."""
-        return self.command_ranges[dotted(group.feed.input, group.feed.name)][1]
-
-    @staticmethod
-    def _answer(answers: dict[str, Any], group: Group, command: Value) -> None:
-        feed = group.feed
-        if feed.name:
-            answers.setdefault(feed.input, {})[feed.name] = command
-        else:
-            answers[feed.input] = command
 
     # ------------------------------------------------------------------ rows
 

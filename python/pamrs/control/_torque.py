@@ -42,6 +42,13 @@ class TorqueModel(Protocol):
         """``C1`` [N m/Pa], above zero, and ``C2`` [N m] at an angle [rad]."""
 
 
+def drive_limits(torque: TorqueModel, angle: Value, pressure_limit: float) -> tuple[Value, Value]:
+    """Least and largest drive at an angle [Pa]: a model's own, or any pressure up to the limit."""
+    own = getattr(torque, "limits", None)
+    found: tuple[Value, Value] = own(angle, pressure_limit) if own else (0.0, pressure_limit)
+    return found
+
+
 class _Straight:
     """How a muscle pulls on a load: straight, the shortening [m] in the place of an angle."""
 
@@ -533,13 +540,9 @@ def group_torques(rig: Rig, groups: Sequence[Group]) -> dict[str, GroupTorque]:
 
 
 def joint_torque(
-    rig: Rig,
-    joint: str,
-    torque: str | TorqueModel,
-    groups: tuple[Group, ...],
-    whole: bool,
+    rig: Rig, joint: str, torque: str | TorqueModel, active: Sequence[str] | None
 ) -> TorqueModel:
-    """The torque model of a joint.
+    """The torque model of a joint, or of what a mass hangs from.
 
     Parameters
     ----------
@@ -548,10 +551,8 @@ def joint_torque(
         Its name.
     torque : {"full", "simplified", "gaylord"} or TorqueModel
         Which; of several muscles the full one.
-    groups : tuple of Group
-        Those that are used.
-    whole : bool
-        Whether that is all of them.
+    active : sequence of str, optional
+        Chambers whose muscles are used; all by default.
 
     Returns
     -------
@@ -560,19 +561,23 @@ def joint_torque(
     Raises
     ------
     ParameterError
-        If there is no such torque model, or no muscle in use raises the angle.
+        If there is no such torque model or chamber, or no muscle in use raises the angle.
     """
+    groups = active_groups(rig, active)
     makers: dict[str, Any] = {
         "full": FullTorque,
         "simplified": SimplifiedTorque.fit,
         "gaylord": GaylordTorque,
     }
+    one_link = active is None and not rig.tables("link")
+    alone = one_link and len(rig.tables("muscle")) == len(rig.tables("joint")) == 1
     if isinstance(torque, str):
         one_of("torque", torque, makers, also=", or a model")
-    alone = whole and len(rig.tables("muscle")) == len(rig.tables("joint")) == 1
-    if alone:
-        chosen: TorqueModel = makers[torque](rig) if isinstance(torque, str) else torque
-        return chosen
+        if alone:
+            made: TorqueModel = makers[torque](rig)
+            return made
+    elif alone or rig.tables("load"):
+        return torque
     if torque != "full":
         raise ParameterError(
             f"torque = {torque!r} is not allowed for rig {rig.name!r}, which has several muscles: "

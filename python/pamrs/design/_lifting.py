@@ -125,11 +125,8 @@ class Lift(View):
         at = float(np.interp(self.reached, self.angle, self.gravity))
         muscles = float(np.interp(self.reached, self.angle, self.torque))
         lost = f" less {self.coulomb:.3g} N m of friction" if self.coulomb else ""
-        where = (
-            f"beyond {_degrees(self.reached)} deg"
-            if self.reached > self.angle[0]
-            else f"off its stop at {first} deg"
-        )
+        lifted = self.reached > self.angle[0]
+        where = f"beyond {_degrees(self.reached)} deg" if lifted else f"off its stop at {first} deg"
         balance = f"there the muscles give {muscles:.4g} N m{lost}, gravity takes {at:.4g} N m"
         again = "".join(
             f"; brought there, it goes on from {_degrees(a)} to {_degrees(b)} deg"
@@ -260,12 +257,9 @@ def lift(
     low, high = float(joint["min_angle"]), float(joint["max_angle"])
     end = high if to is None else float(to)
     if not low < end <= high:
-        allowed = (
-            f"above joint.min_angle = {_degrees(low)} deg, at most joint.max_angle = "
-            f"{_degrees(high)} deg"
-        )
         raise ParameterError(
-            f"to = {end:g} rad ({math.degrees(end):.4g} deg) is not allowed: {allowed}"
+            f"to = {end:g} rad ({math.degrees(end):.4g} deg) is not allowed: above "
+            f"joint.min_angle = {_degrees(low)} deg, at most joint.max_angle = {_degrees(high)} deg"
         )
     whole("points", points, 3)
     balance = _Balance(rig, pressure)
@@ -300,7 +294,7 @@ def lift(
         held=_held(balance, angle),
         regained=regained,
         can_lift=bool(lifted and not crossings),
-        margin=float(balance.excess(np.array([margin_angle]))[0]),
+        margin=_of_one(balance.excess)(margin_angle),
         margin_angle=margin_angle,
         payload_limit=limit,
         limit_angle=limit_angle,
@@ -327,10 +321,13 @@ class _Balance:
         self.joint = next(iter(rig.tables("joint").values()))
         transmissions = rig.tables("transmission")
         self.groups = [
-            (rig.muscle_of(name), Joint.from_model(transmissions.get(name, self.joint)))
+            (
+                rig.muscle_of(name),
+                Joint.from_model(transmissions.get(name, self.joint)),
+                _hysteresis(rig, name),
+            )
             for name in rig.tables("muscle")
         ]
-        self.hysteresis = [_hysteresis(rig, name) for name in rig.tables("muscle")]
         self.pressure = pressure
         self.coulomb = float(self.arm["coulomb"])
 
@@ -339,18 +336,13 @@ class _Balance:
         lower the arm are vented.
         """
         total = np.zeros(angle.shape)
-        for (muscle, joint), (constant, by_pressure) in zip(
-            self.groups, self.hysteresis, strict=True
-        ):
+        for muscle, joint, (constant, by_pressure) in self.groups:
             rest, count = float(muscle.parameters["rest_length"]), int(muscle.parameters["count"])
             arm = joint.torque_arm(angle)
             # a muscle on the other side of the joint lengthens where the arm rises
             way = direction * np.sign(np.where(arm == 0.0, 1.0, arm))
-            pressure = (
-                np.where(arm < 0.0, 0.0, self.pressure)
-                if len(self.groups) > 1
-                else np.full(angle.shape, self.pressure)
-            )
+            lowers = (arm < 0.0) & (len(self.groups) > 1)
+            pressure = np.where(lowers, 0.0, self.pressure)
             friction = constant + by_pressure * np.maximum(pressure, 0.0)
             force = muscle.force(pressure, joint.shortening(angle) / rest, way) + way * friction
             total += count * muscle.buckled(force) * arm
@@ -380,27 +372,25 @@ class _Balance:
         """Muscles and friction less gravity, holding [N m]."""
         return self.torque(angle, _HOLDING) + self.coulomb - self.gravity(angle)
 
+    def free(self, angle: Array) -> Array:
+        """What lifts a payload: muscles less friction less the empty arm [N m]."""
+        return self.torque(angle, _LIFTING) - self.coulomb - self.own(angle)
+
     def capacity(self, angle: Array) -> Array:
         """Payload just lifted past an angle [kg]."""
-        free = self.torque(angle, _LIFTING) - self.coulomb - self.own(angle)
-        weight = self.weight(angle)
+        free, weight = self.free(angle), self.weight(angle)
         return np.where(weight > 0.0, free / np.where(weight > 0.0, weight, 1.0), math.inf)
 
     def limit(self, angle: Array) -> tuple[float | None, float]:
         """The most that is lifted at every angle, and where that is decided."""
         where = _least(self.capacity, angle)
-        limit = float(self.capacity(np.array([where]))[0])
+        limit = _of_one(self.capacity)(where)
         if limit < 0.0:
             return None, where
         # where a payload helps or does not weigh, the muscles must still do their part
         helped = self.weight(angle) <= 0.0
         load = 0.0 if math.isinf(limit) else limit
-        rest = (
-            self.torque(angle, _LIFTING)
-            - self.coulomb
-            - self.own(angle)
-            - load * self.weight(angle)
-        )[helped]
+        rest = (self.free(angle) - load * self.weight(angle))[helped]
         if rest.size and rest.min() < 0.0:
             return None, float(angle[helped][rest.argmin()])
         return limit, where
@@ -420,21 +410,19 @@ def _pressure(rig: Rig, pressure: float | None) -> float:
     return known
 
 
+def _of_one(function: Callable[[Array], Array]) -> Callable[[float], float]:
+    """A function over arrays as one of a single angle."""
+    return lambda angle: float(function(np.array([angle]))[0])
+
+
 def _crossings(function: Callable[[Array], Array], angle: Array) -> list[float]:
     """Where a function changes sign between the first and the last angle."""
     from scipy.optimize import brentq
 
-    positive = function(angle) > 0.0
-    found = []
+    positive, found = function(angle) > 0.0, []
     for index in np.flatnonzero(positive[1:] != positive[:-1]).tolist():
         low, high = float(angle[index]), float(angle[index + 1])
-        found.append(
-            float(
-                brentq(
-                    lambda x: float(function(np.array([x]))[0]), low, high, xtol=1e-14, rtol=1e-14
-                )
-            )
-        )
+        found.append(float(brentq(_of_one(function), low, high, xtol=1e-14, rtol=1e-14)))
     return found
 
 
@@ -448,10 +436,7 @@ def _least(function: Callable[[Array], Array], angle: Array) -> float:
         return float(angle[best])
     around = (float(angle[best - 1]), float(angle[best + 1]))
     found = minimize_scalar(
-        lambda x: float(function(np.array([x]))[0]),
-        bounds=around,
-        method="bounded",
-        options={"xatol": 1e-10},
+        _of_one(function), bounds=around, method="bounded", options={"xatol": 1e-10}
     )
     return float(found.x if found.fun < values[best] else angle[best])
 

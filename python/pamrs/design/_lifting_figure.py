@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pamrs.design.figures import headed, png
+from pamrs.design.figures import fill_lack, headed, png
 from pamrs.report.figures import COLOURS, STYLE
 
 if TYPE_CHECKING:
@@ -57,17 +57,7 @@ def draw_torques(axes: Axes, result: Lift) -> None:
     """Muscles against gravity; what is missing is filled."""
     angle, lifting = np.degrees(result.angle), result.torque - result.coulomb
     holding = result.torque_holding + result.coulomb
-    short = lifting < result.gravity
-    axes.fill_between(
-        angle,
-        lifting,
-        result.gravity,
-        where=short,
-        interpolate=True,
-        color=COLOURS["before"],
-        alpha=0.22,
-        lw=0,
-    )
+    fill_lack(axes, angle, lifting, result.gravity, alpha=0.22)
     if float(np.abs(holding - lifting).max()) > 0.01 * float(np.abs(lifting).max()):
         axes.plot(
             angle,

@@ -100,6 +100,17 @@ def png(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
+def fill_lack(axes: Axes, angle: Any, given: Any, wanted: Any, *, alpha: float) -> None:
+    """Fill what is missing of a torque between it and the one that is wanted."""
+    style: dict[str, Any] = {"color": COLOURS["before"], "alpha": alpha, "lw": 0}
+    axes.fill_between(angle, given, wanted, where=given < wanted, interpolate=True, **style)
+
+
+def _note(axes: Axes, text: str, at: Any, offset: tuple[float, float], **style: Any) -> None:
+    """Write a few words beside a place, so many points off."""
+    axes.annotate(text, at, offset, textcoords="offset points", **style)
+
+
 def _sizes(design: JointDesign) -> str:
     return ", ".join(
         f"{symbol} {1e3 * value:.1f}"
@@ -129,14 +140,8 @@ def _fitness(axes: Axes, design: JointDesign) -> None:
     axes.step(generation, history.best, where="post", color=_SERIES[0], lw=1.6, label="best so far")
     _log_scale(axes)
     axes.set_ylim(0.7 * float(history.best[-1]), top)
-    axes.annotate(
-        f"{history.best[-1]:.4g} J",
-        (generation[-1], history.best[-1]),
-        (0, 12),
-        textcoords="offset points",
-        ha="right",
-        color=_SERIES[0],
-    )
+    at = (generation[-1], history.best[-1])
+    _note(axes, f"{history.best[-1]:.4g} J", at, (0, 12), ha="right", color=_SERIES[0])
     method = _NAMES[design.search.method].replace("\n", " ")  # type: ignore[union-attr]
     axes.set(xlabel=f"generation ({method})", ylabel="J [J]")
     axes.legend(loc="upper right")
@@ -159,16 +164,9 @@ def _lengths(axes: Axes, design: JointDesign) -> None:
     ends = _spread(values[-1], 0.075 * span)
     for column, (symbol, colour) in enumerate(zip(SYMBOLS, _SERIES, strict=True)):
         axes.step(generation, values[:, column], where="post", color=colour, lw=1.5)
-        text = f"{symbol} {values[-1, column]:.1f}"
-        axes.annotate(
-            text,
-            (1.0, ends[column]),
-            (4, 0),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            va="center",
-            color=colour,
-        )
+        text, edge = f"{symbol} {values[-1, column]:.1f}", ("axes fraction", "data")
+        at = (1.0, ends[column])
+        _note(axes, text, at, (4, 0), xycoords=edge, va="center", color=colour)
     axes.set(xlabel="generation", ylabel="length [mm]")
     axes.set_ylim(values.min() - 0.08 * span, values.max() + 0.08 * span)
 
@@ -186,16 +184,7 @@ def _torque(axes: Axes, design: JointDesign) -> None:
     """Figures 3.22 to 3.24: threshold, first generation, result; what is missing is filled."""
     problem, scores = design.problem, design.scores
     angle, torque = np.degrees(problem.angles), scores.torque[0]
-    axes.fill_between(
-        angle,
-        torque,
-        problem.torque,
-        where=torque < problem.torque,
-        interpolate=True,
-        color=COLOURS["before"],
-        alpha=0.25,
-        lw=0,
-    )
+    fill_lack(axes, angle, torque, problem.torque, alpha=0.25)
     axes.axhline(
         problem.torque,
         color=_INK,
@@ -212,16 +201,10 @@ def _torque(axes: Axes, design: JointDesign) -> None:
         angle, torque, color=_SERIES[0], lw=1.8, label=f"result at {problem.pressure / 1e5:.4g} bar"
     )
     if not scores.available[0]:
-        axes.axvline(math.degrees(scores.max_angle[0]), color=COLOURS["before"], lw=1.0)
-        axes.annotate(
-            "limit of the stroke or the tendon",
-            (math.degrees(scores.max_angle[0]), 0.03),
-            (-4, 0),
-            xycoords=("data", "axes fraction"),
-            textcoords="offset points",
-            ha="right",
-            color=COLOURS["before"],
-        )
+        limit, colour = math.degrees(scores.max_angle[0]), COLOURS["before"]
+        axes.axvline(limit, color=colour, lw=1.0)
+        text, foot = "limit of the stroke or the tendon", ("data", "axes fraction")
+        _note(axes, text, (limit, 0.03), (-4, 0), xycoords=foot, ha="right", color=colour)
     axes.set(xlabel="joint angle [deg]", ylabel="torque [N m]")
     axes.set_ylim(0.0, 1.3 * max(problem.torque, float(torque.max())))
     axes.legend(loc="upper right", ncols=2)
@@ -279,12 +262,8 @@ def _joint(axes: Axes, design: JointDesign) -> None:
             f"{math.degrees(angle):.4g} deg", tuple(place), ha="center", va="center", color=_INK
         )
     axes.plot(0.0, 0.0, "o", ms=8, color=_INK, zorder=5)
-    axes.annotate(
-        "muscles", (reach, upper_offset), (0, 9), textcoords="offset points", ha="right", color=_INK
-    )
-    axes.annotate(
-        "upper link", (reach, 0.0), (0, -13), textcoords="offset points", ha="right", color=_INK
-    )
+    _note(axes, "muscles", (reach, upper_offset), (0, 9), ha="right", color=_INK)
+    _note(axes, "upper link", (reach, 0.0), (0, -13), ha="right", color=_INK)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.12)
     axes.grid(visible=False)

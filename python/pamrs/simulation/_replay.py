@@ -80,9 +80,8 @@ def replay(
                 own is None or (isinstance(own, dict) and name not in own)
             ):
                 full = dotted(channel, name)
-                initial[full] = float(recording.channels[full][recording.mask[full]][0]) - _zero(
-                    rig, channel, name
-                )
+                first = float(recording.channels[full][recording.mask[full]][0])
+                initial[full] = first - _zero(rig, channel, name)
     for name, kelvin in (temperatures or {}).items():
         initial[dotted("temperature", name)] = kelvin
     if not drive:
@@ -159,26 +158,16 @@ def differences(result: Simulation, recording: Recording) -> dict[str, float]:
         Channel -> difference in its SI unit.
     """
     drive = _drive(result.rig, recording)
-    skipped = {
-        "time",
-        "valve_command",
-        "supply_command",
-        *(["length"] if "length" in drive else []),
-    }
+    skipped = {"time", "valve_command", "supply_command", *drive} - {"pressure"}
     skipped |= {dotted("muscle_pressure", name) for name in drive.get("pressure", ())}
     found = {}
     for name in result:
         other = recorded_as(name)
-        if (
-            {channel_of(name), name} & skipped
-            or other not in recording.mask
-            or not recording.mask[other].any()
-        ):
+        rows = recording.mask.get(other)
+        if {channel_of(name), name} & skipped or rows is None or not rows.any():
             continue
-        rows = recording.mask[other]
-        found[name] = float(
-            np.sqrt(np.mean((result[name][rows] - recording.channels[other][rows]) ** 2))
-        )
+        apart = result[name][rows] - recording.channels[other][rows]
+        found[name] = float(np.sqrt(np.mean(apart**2)))
     return found
 
 

@@ -186,11 +186,6 @@ class _Told(NamedTuple):
         return f"{self.block}: {self.what} from {self.times[0]:.4g} s {end}{again}; {self.more}"
 
 
-def _edges(of: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Rows from which something holds and from which it no longer does, in turn."""
-    return np.flatnonzero(np.diff(of, prepend=False))
-
-
 def _again(count: int) -> str:
     """How often something happened that was told once."""
     return {1: "", 2: " and once more"}.get(count, f" and {count - 1} more times")
@@ -219,42 +214,39 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         return sorted([*self._happened, *seen], key=lambda event: event.time)
 
     def _clipped(self) -> list[_Told]:
-        """Commands that are beyond the range of their valve at some time."""
+        """Commands that may be beyond the range of their valve at some time."""
         found = []
         for name, command in self.under("valve_command").items():
             valve = self.rig.tables("valve")[name]
             null, half = valve["null_voltage"], valve["half_range"]
             held = command[:-1] if command.size > 1 else command  # the last one is not run
             beyond = np.abs(held - null) > half * (1.0 + _BEYOND_RANGE)
-            if beyond.any():
-                times = [float(t) for t in self.time[_edges(beyond)]]
-                worst = float(held[np.argmax(np.abs(held - null))])
-                limits = f"{null - half:.4g} to {null + half:.4g} V"
-                what = f"command clipped to its range of {limits}"
-                kinds = ("command_clipped", "command_in_range")
-                more = f"{worst:.4g} V was asked for"
-                found.append(_Told(dotted("valve", name), kinds, times, what, more))
+            worst = float(held[np.argmax(np.abs(held - null))])
+            what = f"command clipped to its range of {null - half:.4g} to {null + half:.4g} V"
+            kinds, more = ("command_clipped", "command_in_range"), f"{worst:.4g} V was asked for"
+            found.append(_Told(dotted("valve", name), kinds, self._turns(beyond), what, more))
         return found
 
     def _happenings(self) -> list[_Told]:
         """What the recorded channels show to have happened."""
-        return [*self._clipped(), *self._pushed()]
+        return [told for told in (*self._clipped(), *self._pushed()) if told.times]
+
+    def _turns(self, of: NDArray[np.bool_]) -> list[float]:
+        """Times from which something holds and from which it no longer does, in turn [s]."""
+        return [float(time) for time in self.time[np.flatnonzero(np.diff(of, prepend=False))]]
 
     def _pushed(self) -> list[_Told]:
-        """Muscles that push at some time, of those that can."""
+        """Muscles that may push at some time."""
         found = []
         for name, muscle in self.rig.tables("muscle").items():
             load, force = muscle["buckling_load"], self.under("muscle_force").get(name)
             if load == 0.0 or force is None:
                 continue
             each = force / muscle["count"]
-            pushing = each < -min(_TELLING_PUSH, 0.5 * load)
-            if pushing.any():
-                times = [float(t) for t in self.time[_edges(pushing)]]
-                what = f"pushes, each muscle with up to {-float(each.min()):.4g} N,"
-                more = f"its buckling_load is {load:.4g} N"
-                kinds = ("muscle_pushes", "push_ends")
-                found.append(_Told(dotted("muscle", name), kinds, times, what, more))
+            times = self._turns(each < -min(_TELLING_PUSH, 0.5 * load))
+            what = f"pushes, each muscle with up to {-float(each.min()):.4g} N,"
+            kinds, more = ("muscle_pushes", "push_ends"), f"its buckling_load is {load:.4g} N"
+            found.append(_Told(dotted("muscle", name), kinds, times, what, more))
         return found
 
     @property
@@ -305,44 +297,44 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         ParameterError
             If a channel was not recorded.
         """
-        channels = self._channels
         self._check_whole("balance")
-        gain = {name: float(channels[name][-1] - channels[name][0]) for name in _BALANCES}
-        held = ("air_mass", "line_mass", "segment_mass")
-        masses = [mass for channel in held for mass in self.under(channel).values()]
+        masses = [
+            dotted(channel, block)
+            for channel in ("air_mass", "line_mass", "segment_mass")
+            for block in self.under(channel)
+        ]
+        heat = [name for name in _HEAT_BALANCES if name in self._channels]
         return Balance(
-            supplied=gain["mass_supplied"],
-            vented=gain["mass_vented"],
-            stored=sum(float(mass[-1] - mass[0]) for mass in masses),
+            supplied=self._gain("mass_supplied"),
+            vented=self._gain("mass_vented"),
+            stored=sum(self._gain(mass) for mass in masses),
             implied=self._implied(),
-            energy=gain["energy_supplied"],
-            exergy=gain["exergy_supplied"],
-            muscle_work=gain["muscle_work"],
-            joint_work=gain["joint_work"],
+            energy=self._gain("energy_supplied"),
+            exergy=self._gain("exergy_supplied"),
+            muscle_work=self._gain("muscle_work"),
+            joint_work=self._gain("joint_work"),
             laws=self._laws(),
-            **{
-                name.removesuffix("_gained"): float(channels[name][-1] - channels[name][0])
-                for name in _HEAT_BALANCES
-                if name in channels
-            },
+            **{name.removesuffix("_gained"): self._gain(name) for name in heat},
         )
+
+    def _gain(self, channel: str) -> float:
+        """A channel at the last row less that at the first one."""
+        values = self._channels[channel]
+        return float(values[-1] - values[0])
 
     def _implied(self) -> float:
         """Gain of mass by the gas law at the rest temperature [kg]."""
         gas = self.rig.tables("gas")[""]
-        total = self._implied_in_lines(gas["gas_constant"] * gas["temperature"])
+        rt = gas["gas_constant"] * gas["temperature"]
+        total = self._implied_in_lines(rt)
         for name, volume in self.under("air_volume").items():
-            zero = sensor_zero(self.rig, "chamber", "pressure_zero", name)
-            absolute = (
-                self._channels[dotted("muscle_pressure", name)] - zero + gas["ambient_pressure"]
-            )
             if self.rig.tables("chamber")[name]["gas"] == "energy_balance":
-                mass = self._channels[dotted("air_mass", name)]
-                total += float(mass[-1] - mass[0])
+                total += self._gain(dotted("air_mass", name))
                 continue
-            total += float(absolute[-1] * volume[-1] - absolute[0] * volume[0]) / (
-                gas["gas_constant"] * gas["temperature"]
-            )
+            zero = sensor_zero(self.rig, "chamber", "pressure_zero", name)
+            gauge = self._channels[dotted("muscle_pressure", name)]
+            absolute = gauge - zero + gas["ambient_pressure"]
+            total += float(absolute[-1] * volume[-1] - absolute[0] * volume[0]) / rt
         return total
 
     def _implied_in_lines(self, rt: float) -> float:
@@ -352,10 +344,9 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         total = 0.0
         for line, table in self.rig.tables("line").items():
             count = int(table.get("segments", 0))
-            inlet = dotted("line_pressure", line)
+            inlet, held = dotted("line_pressure", line), dotted("line_mass", line)
             if not count:
-                mass = self._channels.get(dotted("line_mass", line), np.zeros(1))
-                total += float(mass[-1] - mass[0])
+                total += self._gain(held) if held in self._channels else 0.0
                 continue
             segment = math.pi / 4.0 * table["diameter"] ** 2 * table["length"] / count
             between = dotted("segment_pressure", line)
@@ -363,8 +354,7 @@ class Simulation(View, Tabular, Mapping[str, Array]):
             if inlet in self._channels:
                 volumes[inlet] = table["inlet_volume"] + 0.5 * segment
             for channel, volume in volumes.items():
-                pressure = self._channels[channel]
-                total += float(pressure[-1] - pressure[0]) * volume / rt
+                total += self._gain(channel) * volume / rt
         return total
 
     def _laws(self) -> tuple[str, ...]:
@@ -759,11 +749,3 @@ _TELLING_DEGREES = 1.0
 _BEYOND_RANGE = 0.01
 #: Channels of the core that are sums since the start.
 _HEAT_BALANCES = ("enthalpy_gained", "heat_gained", "gas_work")
-_BALANCES = (
-    "mass_supplied",
-    "mass_vented",
-    "energy_supplied",
-    "exergy_supplied",
-    "muscle_work",
-    "joint_work",
-)

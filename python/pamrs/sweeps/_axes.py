@@ -217,7 +217,8 @@ class _Listed(Axes):
             check_column(name, column, own.lower, own.upper, own.unit)
 
 
-def _digest(values: Array) -> str:
+def digest(values: Array) -> str:
+    """What tells numbers from others, for a plan."""
     return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
 
 
@@ -267,9 +268,7 @@ class Grid(_Listed):
 
     def describe(self) -> dict[str, str]:
         order = {"order of the axes": ", ".join(self.names)}
-        return order | {
-            f"values of {k}": f"{v.size}, {_digest(v)}" for k, v in self._values.items()
-        }
+        return order | {f"values of {k}": f"{v.size}, {digest(v)}" for k, v in self._values.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +317,7 @@ class Samples(_Listed):
         return {name: column[start:stop] for name, column in self._values.items()}
 
     def describe(self) -> dict[str, str]:
-        return {f"samples of {k}": f"{v.size}, {_digest(v)}" for k, v in self._values.items()}
+        return {f"samples of {k}": f"{v.size}, {digest(v)}" for k, v in self._values.items()}
 
 
 def chosen(names: Sequence[str] | str | None, default: Sequence[str]) -> list[str]:

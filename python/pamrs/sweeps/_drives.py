@@ -4,7 +4,6 @@ worker needs. All of it can be pickled.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
@@ -21,7 +20,7 @@ from pamrs.errors import PamrsError, ParameterError, RigError
 from pamrs.rig import Rig, parse_rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import REDUCTIONS, core_rig, simulate_batch
-from pamrs.sweeps._axes import INITIAL, Quantity, quantity
+from pamrs.sweeps._axes import INITIAL, Quantity, digest, quantity
 
 Array = NDArray[np.float64]
 
@@ -62,12 +61,8 @@ class Metric(NamedTuple):
         """As ``simulate_batch`` takes it."""
         if self.reduction != "squared_error":
             return self.reduction, self.channel
-        reference = self.reference
-        return (
-            self.reduction,
-            self.channel,
-            np.array(reference) if isinstance(reference, tuple) else reference,
-        )
+        varies = isinstance(self.reference, tuple)
+        return self.reduction, self.channel, np.array(self.reference) if varies else self.reference
 
 
 def metric_of(name: str, given: Any) -> Metric:
@@ -205,22 +200,17 @@ class OpenLoop(Drive):
 
     def _tanks(self, rig: Rig) -> dict[str, str]:
         """Initial pressures of tanks in the rig, and what they are called as initial values."""
-        found = {
-            qualified("supply", name): dotted("supply_pressure", name)
-            for name, table in rig.tables("supply").items()
-            if table["kind"] == "tank"
-        }
+        tanks = [name for name, table in rig.tables("supply").items() if table["kind"] == "tank"]
         return {
-            f"{supply}.initial_pressure": start
-            for supply, start in found.items()
-            if start not in self.initial
+            f"{qualified('supply', name)}.initial_pressure": start
+            for name in tanks
+            if (start := dotted("supply_pressure", name)) not in self.initial
         }
 
     def run(self, rig: Rig, n: int, values: Mapping[str, Array], threads: int | None) -> Done:
-        starts = {k.removeprefix(INITIAL): v for k, v in values.items() if k.startswith(INITIAL)}
         tanks = self._tanks(rig)
-        tank_starts = {tanks[k]: v for k, v in values.items() if k in tanks}
-        starts = tank_starts | starts
+        starts = {tanks[k]: v for k, v in values.items() if k in tanks}
+        starts |= {k.removeprefix(INITIAL): v for k, v in values.items() if k.startswith(INITIAL)}
         numbers = {k: v for k, v in values.items() if not k.startswith(INITIAL) and k not in tanks}
         fixed = {name: np.full(n, value) for name, value in self.initial.items()}
         batch = simulate_batch(
@@ -244,8 +234,7 @@ def _signal_words(signal: Any) -> str:
         return "; ".join(f"{name}: {_signal_words(signal[name])}" for name in sorted(signal))
     if np.ndim(signal) == 0:
         return repr(signal)
-    digest = hashlib.sha256(np.ascontiguousarray(signal).tobytes()).hexdigest()
-    return f"{np.shape(signal)}, {digest}"
+    return f"{np.shape(signal)}, {digest(signal)}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ from pamrs.control.trajectories import Trajectory
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
-from pamrs.sweeps._axes import INITIAL, Axes, Quantity
+from pamrs.sweeps._axes import INITIAL, Axes, Quantity, digest
 from pamrs.sweeps._drives import Done, Drive, failed_rows
 from pamrs.sweeps._sweep import run_plan
 
@@ -79,10 +78,10 @@ class ClosedLoop(Drive):
     def describe(self) -> dict[str, str]:
         duration = self.loop.get("duration") or self.trajectory.duration
         wanted = self.trajectory(np.linspace(0.0, duration, 10_001))
-        digest = hashlib.sha256(np.stack([wanted.angle, wanted.rate]).tobytes()).hexdigest()
+        numbers = digest(np.stack([wanted.angle, wanted.rate]))
         return {
             "controller": _name_of(self.controller),
-            "trajectory": f"{self.trajectory.name}, {digest}",
+            "trajectory": f"{self.trajectory.name}, {numbers}",
         } | {f"loop {name}": repr(value) for name, value in sorted(self.loop.items())}
 
     def rig_names(self, rig: Rig, names: Iterable[str]) -> list[str]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
@@ -32,14 +32,6 @@ METHODS: Final[dict[str, tuple[str, ...]]] = {
     "sobol": ("S1", "S1_conf", "ST", "ST_conf"),
     "morris": ("mu", "mu_star", "mu_star_conf", "sigma"),
 }
-
-
-@dataclass(frozen=True)
-class _Design:
-    """Points of the unit cube, shape (groups * size, d); those of a group are judged together."""
-
-    cube: Array
-    size: int
 
 
 def sensitivity(
@@ -100,21 +92,22 @@ def sensitivity(
     if method == "sobol" and n & (n - 1):
         raise refused("n", n, "a power of two is needed for 'sobol'")
     known = ranges(rig, parameters, within)
-    design = _design(method, len(known), n, seed)
-    columns = {p.name: p.values(design.cube[:, k]) for k, p in enumerate(known)}
+    # points of the unit cube; those of a group, of which there are n, are judged together
+    cube = np.asarray(_salib("sample", method, len(known), n, seed=seed), dtype=np.float64)
+    columns = {p.name: p.values(cube[:, k]) for k, p in enumerate(known)}
     result = sweep(rig, Samples(columns), metrics, store=store, **runs)
-    ended = np.isfinite(result["ended_at"].values).reshape(n, design.size).any(axis=1)
+    ended = np.isfinite(result["ended_at"].values).reshape(n, -1).any(axis=1)
     if (~ended).mean() <= _LEAST_LEFT:
         raise ParameterError(
             f"{ended.sum()} of {n} groups have a run that ended before its end "
             f"({result.attrs['first_ended']}); narrower ranges are needed"
         )
-    kept = np.repeat(~ended, design.size)
+    kept = np.repeat(~ended, len(cube) // n)
     found = {
         f"{name}.{index}": values
         for name in metrics
         for index, values in _analysed(
-            method, design.cube[kept], np.asarray(result[name].values)[kept], seed
+            method, cube[kept], np.asarray(result[name].values)[kept], seed
         ).items()
     }
     units = {name: "1" if method == "sobol" else result[name].attrs["units"] for name in metrics}
@@ -127,48 +120,29 @@ def sensitivity(
     )
 
 
-def _problem(dimensions: int) -> dict[str, Any]:
-    return {
+def _salib(step: str, method: str, dimensions: int, *given: Any, seed: int) -> Any:
+    """What SALib's function ``sample`` or ``analyze`` of a method answers, without its warnings."""
+    problem = {
         "num_vars": dimensions,
         "names": [f"x{k}" for k in range(dimensions)],
         "bounds": [[0.0, 1.0]] * dimensions,
     }
-
-
-def _salib(module: str) -> Any:
-    import importlib
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return importlib.import_module(f"SALib.{module}")
-    except ImportError as error:
-        raise missing_package(error, "sensitivity") from error
-
-
-def _design(method: str, dimensions: int, n: int, seed: int) -> _Design:
-    sample = _salib(f"sample.{method}").sample
-    problem = _problem(dimensions)
+    own: dict[str, Any] = {"sobol": {"calc_second_order": False}, "morris": {"num_levels": _LEVELS}}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if method == "sobol":
-            cube = sample(problem, n, calc_second_order=False, seed=seed)
-        else:
-            cube = sample(problem, n, num_levels=_LEVELS, seed=seed)
-    return _Design(np.asarray(cube, dtype=np.float64), dimensions + (2 if method == "sobol" else 1))
+        try:
+            module = importlib.import_module(f"SALib.{step}.{method}")
+        except ImportError as error:
+            raise missing_package(error, "sensitivity") from error
+        return getattr(module, step)(problem, *given, seed=seed, **own[method])
 
 
 def _analysed(method: str, cube: Array, values: Array, seed: int) -> dict[str, Array]:
-    problem = _problem(cube.shape[1])
+    dimensions = cube.shape[1]
     if np.ptp(values) == 0.0:
-        return {index: np.full(cube.shape[1], np.nan) for index in METHODS[method]}
-    analyse = _salib(f"analyze.{method}").analyze
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        if method == "sobol":
-            found = analyse(problem, values, calc_second_order=False, seed=seed)
-        else:
-            found = analyse(problem, cube, values, num_levels=_LEVELS, seed=seed)
+        return {index: np.full(dimensions, np.nan) for index in METHODS[method]}
+    given = (values,) if method == "sobol" else (cube, values)
+    found = _salib("analyze", method, dimensions, *given, seed=seed)
     return {index: np.asarray(found[index], dtype=np.float64) for index in METHODS[method]}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -216,21 +217,12 @@ def _check_names(axes: Axes, drive: Drive) -> None:
                 f"metrics has the name {name!r}, which is not allowed: a name without '/' that is "
                 f"none of {', '.join(sorted(taken))}"
             )
-    doubled = [
-        name
-        for name in axes.names
-        if isinstance(drive, OpenLoop)
-        and name.removeprefix(INITIAL) in drive.initial
-        and name.startswith(INITIAL)
-    ]
-    if doubled:
-        raise ParameterError(
-            f"initial has {doubled[0].removeprefix(INITIAL)!r}, which varies; leave it out"
-        )
+    for name in drive.initial if isinstance(drive, OpenLoop) else ():
+        if INITIAL + name in axes.names:
+            raise ParameterError(f"initial has {name!r}, which varies; leave it out")
 
 
 def _try_one(plan: Plan) -> None:
     """The first run, so that arguments that are not allowed are found before there is a store."""
     task = plan.task(0, 1)
-    first = {name: values[:1] for name, values in task.values.items()}
-    run_chunk(type(task)(task.rig, task.drive, first, 1))
+    run_chunk(replace(task, values={name: values[:1] for name, values in task.values.items()}))
