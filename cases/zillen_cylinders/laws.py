@@ -423,9 +423,7 @@ def _fit(
         covar=line.covar,
         pairs={item.record.name: item for item in every},
         issues=[
-            issue
-            for item in (*chosen, *rest)
-            for issue in (*item.record.issues, *item.issues)
+            issue for item in (*chosen, *rest) for issue in (*item.record.issues, *item.issues)
         ],
     )
 
