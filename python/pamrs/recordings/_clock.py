@@ -13,6 +13,7 @@ from pamrs.errors import RecordingError
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Place = int | np.signedinteger
 
 GAP: Final = 1.6  # intervals longer than this many samples are holes
 _JUMP_HOLE: Final = 10  # samples left empty where the clock jumped: the true pause is unknown
@@ -237,7 +238,7 @@ def _plain(interval: float, count: int) -> float:
     return float(f"{interval:.9g}")
 
 
-def _between(placed: Array, first: int, last: int, text: str, kind: str = "gap") -> Event:
+def _between(placed: Array, first: Place, last: Place, text: str, kind: str = "gap") -> Event:
     """Something from the beginning of one interval to the end of another."""
     return Event(kind, float(placed[first]), float(placed[last + 1]), text)
 
