@@ -111,10 +111,7 @@ def test_names_that_are_not_there(tmp_path: Path) -> None:
         log.find("daq/p2")
 
 
-@pytest.mark.parametrize(
-    "ending",
-    ["mat", "h5", "mf4", "tdms", "db3", "mcap", "parquet", "npz", "feather", "xlsx", "xls"],
-)
+@pytest.mark.parametrize("ending", ["mat", "mf4", "db3", "parquet", "feather"])
 def test_broken_files_are_named(tmp_path: Path, ending: str) -> None:
     file = tmp_path / f"broken.{ending}"
     file.write_bytes(b"\x00\x01 this is none of these formats " * 20)
