@@ -127,8 +127,8 @@ def read_map(
     keep, notes = _kept(table, wanted, decimal, source)
     if where is None:
         _one_specimen(table, strange, source)
-    unused = [heading for heading in strange if heading not in wanted]
-    notes += [f"columns not used: {', '.join(unused)}"] if unused else []
+    if unused := [heading for heading in strange if heading not in wanted]:
+        notes.append(f"columns not used: {', '.join(unused)}")
     notes += table.remarks
     values = {
         channel: _numbers(table, column, channel, source, decimal)[keep]
@@ -138,10 +138,9 @@ def read_map(
         contraction = _fraction(values["contraction"], source)
         notes += _narrow(contraction, found["contraction"])
         values["length"] = rest_length * (1.0 - contraction)
+    measured = {name: values[name] for name in ("length", "pressure", "force")}
     return ForceMap.from_arrays(
-        length=values["length"],
-        pressure=values["pressure"],
-        force=values["force"],
+        **measured,
         rest_length=rest_length,
         direction=values.get("direction"),
         **levels,
@@ -149,7 +148,7 @@ def read_map(
         source=source,
         notes=notes,
         row_numbers=np.asarray(table.row_numbers)[keep].tolist(),
-        units={name: found[name].unit for name in ("length", "pressure", "force") if name in found},
+        units={name: found[name].unit for name in measured if name in found},
     )
 
 
