@@ -138,9 +138,12 @@ def read_map(
         contraction = _fraction(values["contraction"], source)
         notes += _narrow(contraction, found["contraction"])
         values["length"] = rest_length * (1.0 - contraction)
-    measured = {name: values[name] for name in ("length", "pressure", "force")}
+    measured = ("length", "pressure", "force")
+    length, pressure, force = (values[name] for name in measured)
     return ForceMap.from_arrays(
-        **measured,
+        length=length,
+        pressure=pressure,
+        force=force,
         rest_length=rest_length,
         direction=values.get("direction"),
         **levels,
