@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -60,27 +61,31 @@ def percent(value: float | None) -> str:
 def table(comparison: ModelComparison) -> str:
     """Largest and rms errors of every model as Markdown."""
     lines = [
-        (
-            "| model | order | unknowns | all pressures | each from the others | three pressures, "
-            "the others |"
-        ),
+        "| model | order | unknowns | all pressures | each from the others | three pressures, "
+        "the others |",
         "|---|---|---|---|---|---|",
     ]
     for row in comparison.rows:
+        order = row["order"] or ""
         if row["rank"] is None:
-            lines.append(
-                f"| {row['model']} | {row['order'] or ''} | {row['nvarys']} | not determined | | |"
-            )
+            lines.append(f"| {row['model']} | {order} | {row['nvarys']} | not determined | | |")
             continue
-        pairs = [
-            (row["max"], row["rms"]),
-            (row["lopo_max"], row["lopo_rms"]),
-            (row["subset_max"], row["subset_rms"]),
-        ]
+        pairs = [(row[f"{kind}max"], row[f"{kind}rms"]) for kind in ("", "lopo_", "subset_")]
         cells = " | ".join(f"{percent(worst)} ({percent(rms)})" for worst, rms in pairs)
         star = " *" if row["recommended"] else ""
-        lines.append(f"| {row['model']}{star} | {row['order'] or ''} | {row['nvarys']} | {cells} |")
+        lines.append(f"| {row['model']}{star} | {order} | {row['nvarys']} | {cells} |")
     return "\n".join(lines)
+
+
+def sizes_of(tolerance: Mapping[str, float]) -> dict[str, float]:
+    """What is known of the geometry, without the moduli."""
+    return {key: value for key, value in tolerance.items() if not key.startswith("modulus")}
+
+
+def worst_of(measured: MeasuredMuscle, **settings: Any) -> float:
+    """Largest error of a fit on the levels that it has not seen, a fraction."""
+    fit = fit_muscle(measured.data, measured.muscle, **settings)
+    return (fit.errors_of("held_out") or (0.0, 0.0))[1]
 
 
 def other_choices(measured: MeasuredMuscle, published: float, settings: dict[str, Any]) -> str:
@@ -88,10 +93,8 @@ def other_choices(measured: MeasuredMuscle, published: float, settings: dict[str
     largest held-out errors.
     """
     lines = [
-        (
-            "| model | order | prior | median | nine in ten below | worst | choices below the "
-            "published error |"
-        ),
+        "| model | order | prior | median | nine in ten below | worst | choices below the "
+        "published error |",
         "|---|---|---|---|---|---|---|",
     ]
     choices = wide_triples(measured.data.levels)
@@ -103,29 +106,14 @@ def other_choices(measured: MeasuredMuscle, published: float, settings: dict[str
         ("robinson", 4, 1 / 3),
         ("robinson", 4, 3),
     ):
-        known = {
-            key: value * (width if key.startswith("modulus") else 1)
-            for key, value in settings["tolerance"].items()
-        }
-        errors = []
-        for levels in choices:
-            fit = fit_muscle(
-                measured.data,
-                measured.muscle,
-                model=model,
-                order=order,
-                levels=levels,
-                **{**settings, "tolerance": known},
-            )
-            errors.append(100 * (fit.errors_of("held_out") or (0.0, 0.0))[1])
-        found = np.array(errors)
-        numbers = " | ".join(
-            f"{value:.2f}" for value in (np.median(found), np.percentile(found, 90), found.max())
-        )
-        lines.append(
-            f"| {model} | {order} | x {width:.2g} | {numbers} | {int((found < published).sum())} "
-            f"of {len(choices)} |"
-        )
+        tolerance = settings["tolerance"]
+        known = {key: value * width for key, value in tolerance.items()} | sizes_of(tolerance)
+        own = {**settings, "tolerance": known, "model": model, "order": order}
+        found = 100 * np.array([worst_of(measured, levels=levels, **own) for levels in choices])
+        values = (np.median(found), np.percentile(found, 90), found.max())
+        numbers = " | ".join(f"{value:.2f}" for value in values)
+        below = f"{int((found < published).sum())} of {len(choices)}"
+        lines.append(f"| {model} | {order} | x {width:.2g} | {numbers} | {below} |")
     return "\n".join(lines)
 
 
@@ -134,9 +122,7 @@ def what_is_told(measured: MeasuredMuscle, levels: list[int], settings: dict[str
     the others.
     """
     lines = ["| model | order | nothing | noise | noise and prior |", "|---|---|---|---|---|"]
-    sizes = {
-        key: value for key, value in settings["tolerance"].items() if not key.startswith("modulus")
-    }
+    sizes = {"free": FREE, "tolerance": sizes_of(settings["tolerance"])}
     for model, order in (
         ("kothera", 2),
         ("robinson", 2),
@@ -145,21 +131,10 @@ def what_is_told(measured: MeasuredMuscle, levels: list[int], settings: dict[str
         ("robinson", 4),
     ):
         cells = []
-        for told in (
-            {"tolerance": sizes},
-            {"tolerance": sizes, "noise": settings["noise"]},
-            settings,
-        ):
+        for told in (sizes, sizes | {"noise": settings["noise"]}, settings):
             try:
-                fit = fit_muscle(
-                    measured.data,
-                    measured.muscle,
-                    model=model,
-                    order=order,
-                    levels=levels,
-                    **{"free": FREE, **told},
-                )
-                cells.append(percent((fit.errors_of("held_out") or (0.0, 0.0))[1]))
+                worst = worst_of(measured, model=model, order=order, levels=levels, **told)
+                cells.append(percent(worst))
             except FitError:
                 cells.append("not determined")
         lines.append(f"| {model} | {order} | {' | '.join(cells)} |")
@@ -173,27 +148,20 @@ def one_map(name: str, out: Path) -> None:
     chosen = three(data.levels)
     pressures = ", ".join(f"{data.levels[i] / 1e3:g}" for i in chosen)
     largest = float(data.force[data.used].max())
+    count = int(data.used.sum())
     print(
-        f"\n## {name}\n\n{int(data.used.sum())} points, largest force {largest:.1f} N; published: "
-        f"within {published} %."
-    )
-    print(
-        f"Three pressures: {pressures} kPa. Largest error (rms in brackets), percent of the "
-        "largest force.\n"
+        f"\n## {name}\n\n{count} points, largest force {largest:.1f} N; published: within "
+        f"{published} %.\nThree pressures: {pressures} kPa. Largest error (rms in brackets), "
+        "percent of the largest force.\n"
     )
     print(f"comparing the models on {name} ...", file=sys.stderr)
-    sizes = {
-        key: value for key, value in measured.tolerance.items() if not key.startswith("modulus")
-    }
     nominal = compare_models(data, measured.muscle, levels=chosen)
     print(f"Geometry as stated, nothing known of the moduli:\n\n{table(nominal)}\n")
+    constants = dict.fromkeys(("c10", "c01", "bladder_modulus"), 1e7)
     settings: dict[str, Any] = {
         "free": FREE,
-        "tolerance": {**sizes, "c10": 1e7, "c01": 1e7, "bladder_modulus": 1e7},
+        "tolerance": measured.tolerance | constants,
         "noise": measured.noise,
-    }
-    settings["tolerance"] |= {
-        key: measured.tolerance[key] for key in ("modulus_slope", "modulus_offset")
     }
     fitted = compare_models(data, measured.muscle, levels=chosen, **settings)
     print(
@@ -201,12 +169,9 @@ def one_map(name: str, out: Path) -> None:
         f"prior:\n\n{table(fitted)}\n"
     )
     print(f"trying other sets of three on {name} ...", file=sys.stderr)
-    settings["tolerance"] = {
-        k: v for k, v in settings["tolerance"].items() if k in measured.tolerance
-    }
-    print(
-        f"The same three pressures, with less said:\n\n{what_is_told(measured, chosen, settings)}\n"
-    )
+    settings["tolerance"] = measured.tolerance
+    told = what_is_told(measured, chosen, settings)
+    print(f"The same three pressures, with less said:\n\n{told}\n")
     print(
         "Other choices of three (highest, one in the middle, one low), largest error on the rest:\n"
     )

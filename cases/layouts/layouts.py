@@ -35,6 +35,9 @@ UNITS = {
 """Unit of each column, in SI, and its noise in that unit."""
 
 
+ROLES = ("fit", "fit", "held_out")
+
+
 @dataclass
 class Run:
     """One log: its channels in SI, and what is its own."""
@@ -56,6 +59,10 @@ class Layout:
     runs: Callable[[Rig], list[Run]]
 
 
+def _of(run: pamrs.Simulation, *names: str) -> dict[str, Array]:
+    return {name: run[name] for name in names}
+
+
 def _steps(low: float, high: float, count: int, each: int, seed: int) -> Array:
     levels = np.random.default_rng(seed).uniform(low, high, count)
     levels[0] = low
@@ -65,23 +72,21 @@ def _steps(low: float, high: float, count: int, each: int, seed: int) -> Array:
 def _regulator(rig: Rig) -> list[Run]:
     """Steps of the set pressure; one gauge, at the chamber."""
     found = []
-    for seed, role in enumerate(("fit", "fit", "held_out")):
+    for seed, role in enumerate(ROLES):
         command = _steps(0.5e5, 6e5, 24, 100, seed)
         run = pamrs.simulate(rig, supply_command=command, sample_time=0.005)
-        channels = {"supply_command": command, "muscle_pressure": run["muscle_pressure"]}
-        found.append(Run(channels, 0.005, role))
+        found.append(Run({"supply_command": command, **_of(run, "muscle_pressure")}, 0.005, role))
     return found
 
 
 def _nozzles(rig: Rig) -> list[Run]:
     """The tank blown down through three nozzles, with its pressure and a thermometer in the gas."""
     found = []
-    nozzles = ((1.0e-6, "fit"), (0.6e-6, "fit"), (1.8e-6, "held_out"))
-    truth = rig.parameter("line.discharge_area").value / nozzles[0][0]
-    for area, role in nozzles:
+    truth = rig.parameter("line.discharge_area").value / 1.0e-6
+    for area, role in zip((1.0e-6, 0.6e-6, 1.8e-6), ROLES, strict=True):
         own = rig.with_parameters({"line.discharge_area": truth * area})
         run = pamrs.simulate(own, duration=30.0, sample_time=0.02)
-        channels = {name: run[name] for name in ("muscle_pressure", "temperature")}
+        channels = _of(run, "muscle_pressure", "temperature")
         value = f'{{ value = {area * 1e6:g}, unit = "mm2", error = "proportional" }}'
         told = f'"line.discharge_area" = {value}'
         found.append(Run(channels, 0.02, role, own="" if area == 1.0e-6 else told))
@@ -91,12 +96,11 @@ def _nozzles(rig: Rig) -> list[Run]:
 def _tube(rig: Rig) -> list[Run]:
     """Eight metres of tube with a gauge at either end."""
     found = []
-    for seed, role in enumerate(("fit", "fit", "held_out")):
+    for seed, role in enumerate(ROLES):
         command = 5.0 + _steps(-4.0, 4.0, 20, 150, 10 + seed)
         run = pamrs.simulate(rig, valve_command=command, sample_time=0.004)
-        names = ("supply_pressure", "line_pressure", "muscle_pressure")
-        channels = {"valve_command": command} | {n: run[n] for n in names}
-        found.append(Run(channels, 0.004, role))
+        pressures = _of(run, "supply_pressure", "line_pressure", "muscle_pressure")
+        found.append(Run({"valve_command": command, **pressures}, 0.004, role))
     return found
 
 
@@ -104,33 +108,25 @@ def _isometric(rig: Rig) -> list[Run]:
     """The length held at three places, the pressure up and down at three speeds."""
     found = []
     rest = rig.parameter("muscle.rest_length").value
-    for k, role in enumerate(("fit", "fit", "held_out")):
+    for k, role in enumerate(ROLES):
         time = np.arange(0.0, 30.0, 0.01)
         pressure = 2.2e5 - 2.15e5 * np.cos(2 * np.pi * (0.1 + 0.07 * k) * time)
         length = np.full(time.size, rest * (0.95 - 0.05 * k))
         run = pamrs.simulate(rig, length=length, pressure=pressure, sample_time=0.01)
-        channels = {
-            "muscle_pressure": run["muscle_pressure"],
-            "length": length,
-            "force": run["muscle_force"],
-        }
-        found.append(Run(channels, 0.01, role))
+        channels = {"length": length, "force": run["muscle_force"]}
+        found.append(Run(_of(run, "muscle_pressure") | channels, 0.01, role))
     return found
 
 
 def _hanging(rig: Rig) -> list[Run]:
     """A mass on a regulator; the length falls out now and then, to the end of its scale."""
     found = []
-    for seed, role in enumerate(("fit", "fit", "held_out")):
+    for seed, role in enumerate(ROLES):
         time = np.arange(0.0, 30.0, 0.01)
         slow = np.sin(2 * np.pi * (0.1 + 0.04 * seed) * time)
         command = 3.6e5 + 0.8e5 * slow + 0.4e5 * np.sin(2 * np.pi * 0.43 * time)
         run = pamrs.simulate(rig, supply_command=command, sample_time=0.01)
-        channels = {
-            "supply_command": command,
-            "muscle_pressure": run["muscle_pressure"],
-            "length": run["length"],
-        }
+        channels = {"supply_command": command, **_of(run, "muscle_pressure", "length")}
         starts = np.random.default_rng(20 + seed).integers(200, 2900, 6)
         holes = [("length", int(start), int(start) + 8) for start in starts]
         found.append(Run(channels, 0.01, role, holes=holes))

@@ -26,6 +26,7 @@ JOINT, PLUS, MINUS = 0, 0, 1
 RESET = 5
 """Rows left out at both ends of an episode: artefacts of the reset."""
 EPISODES, HELD_OUT = 12, 4
+HEADING = "time [s],muscle_pressure.plus [bar],muscle_pressure.minus [bar],joint_angle.base [rad]"
 
 
 def episode(path: Path) -> NDArray[np.float64]:
@@ -54,23 +55,17 @@ def convert(folder: Path, *, unit_bar: float, rate: float, data: Path = DATA) ->
         Names of the episodes, the held-out ones last.
     """
     found = {path.name: episode(path) for path in sorted(data.iterdir()) if path.is_file()}
-    chosen = sorted(found, key=lambda name: -float(np.std(found[name][:, 0])) * len(found[name]))[
-        :EPISODES
-    ]
+    most = {name: np.std(rows[:, 0]) * len(rows) for name, rows in found.items()}
+    chosen = sorted(found, key=lambda name: -float(most[name]))[:EPISODES]
     folder.mkdir(parents=True, exist_ok=True)
     held = set(chosen[2 :: EPISODES // HELD_OUT])
     entries = []
     for name in sorted(chosen, key=lambda name: (name in held, name)):
         angle, plus, minus = found[name].T
-        table = np.column_stack(
-            [np.arange(len(angle)) / rate, unit_bar * plus, unit_bar * minus, angle]
-        )
-        heading = (
-            "time [s],muscle_pressure.plus [bar],muscle_pressure.minus [bar],joint_angle.base [rad]"
-        )
-        np.savetxt(
-            folder / f"{name}.csv", table, delimiter=",", header=heading, comments="", fmt="%.9g"
-        )
+        time = np.arange(len(angle)) / rate
+        table = np.column_stack([time, unit_bar * plus, unit_bar * minus, angle])
+        file = folder / f"{name}.csv"
+        np.savetxt(file, table, delimiter=",", header=HEADING, comments="", fmt="%.9g")
         entries.append(
             f'[[recording]]\nfile = "{name}.csv"\n'
             f'role = "{"held_out" if name in held else "fit"}"\n'
@@ -86,9 +81,7 @@ def convert(folder: Path, *, unit_bar: float, rate: float, data: Path = DATA) ->
 
 def main() -> None:
     """Read the arguments and write the case."""
-    parser = argparse.ArgumentParser(
-        description="Episodes of pam_arm_shaj as a case of one antagonistic joint."
-    )
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
     parser.add_argument("folder", type=Path)
     parser.add_argument(
         "--unit-bar", type=float, default=3.0, help="gauge pressure of the scaled value 1 [bar]"
@@ -97,10 +90,8 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=DATA)
     args = parser.parse_args()
     if not args.data.is_dir():
-        print(
-            f"the recordings are not there: {args.data.resolve()}; the README says where they come "
-            "from"
-        )
+        where = args.data.resolve()
+        print(f"the recordings are not there: {where}; the README says where they come from")
         return
     names = convert(args.folder, unit_bar=args.unit_bar, rate=args.rate, data=args.data)
     print(f"{len(names)} episodes written to {args.folder}; next: pamrs diagnose {args.folder}")

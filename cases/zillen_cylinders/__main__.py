@@ -40,6 +40,11 @@ def cell(fit: CylinderFriction, name: str, factor: float = 1.0) -> str:
     return f"{value:.2f}" + ("" if np.isnan(stderr) else f" +- {stderr:.2f}")
 
 
+def coefficients(fit: CylinderFriction) -> list[str]:
+    """Those of the linear law."""
+    return [cell(fit, "f0"), cell(fit, "f1", 1e5), cell(fit, "breakaway_ratio")]
+
+
 def groups(cylinders: dict[str, list[FrictionRecord]]) -> dict[str, list[FrictionRecord]]:
     """The cylinders; on their own the runs of Circle from one session, and those of X-ring257 below
     its jump.
@@ -60,24 +65,34 @@ def left_out(records: list[FrictionRecord], law: str) -> list[HeldOut]:
         return []
 
 
+def row(*cells: str) -> str:
+    """A row of a table in Markdown."""
+    return f"| {' | '.join(cells)} |"
+
+
+def heading(*cells: str) -> list[str]:
+    """The first rows of one."""
+    return [row(*cells), "|" + "---|" * len(cells)]
+
+
 def main(folder: Path) -> None:
     """Fit, predict, print and draw."""
     if not DATA.is_dir():
-        print(
-            f"the recordings are not there: {DATA.resolve()}; the README says where they come from"
-        )
+        where = DATA.resolve()
+        print(f"the recordings are not there: {where}; the README says where they come from")
         return
     found = load_friction_folder(DATA)
-    fits, report = (
-        [],
-        [f"{gone} equals {kept} byte for byte: left out" for gone, kept in found.duplicates],
+    report = [f"{gone} equals {kept} byte for byte: left out" for gone, kept in found.duplicates]
+    some = heading(
+        *("cylinder", "fitted on [bar]", "f0 [N]", "f1 [N/bar]", "breakaway ratio"),
+        "held out: error [N] (%)",
     )
-    print(
-        "| cylinder | fitted on [bar] | f0 [N] | f1 [N/bar] | breakaway ratio | held out: error "
-        "[N] (%) |"
+    every = heading(
+        *("cylinder, all runs", "f0 [N]", "f1 [N/bar]", "breakaway ratio", "area [mm2]"),
+        *("force zero [N]", *LAWS),
     )
-    print("|---|---|---|---|---|---|")
-    crossed = []
+    laws = heading("cylinder", "depends on pressure (range)", *COMPARED)
+    fits, compared = [], []
     for name, records in groups(found.cylinders).items():
         fit = fit_cylinder_friction(records, fit_on=FIT_ON[len(records)])
         on = ", ".join(f"{p / 1e5:.0f}" for p in fit.pressures)
@@ -85,51 +100,25 @@ def main(folder: Path) -> None:
             f"{x.level.pressure / 1e5:.0f} bar: {x.error:+.2f} ({100 * x.relative_error:+.0f} %)"
             for x in fit.held_out()
         )
-        print(
-            f"| {name} | {on} | {cell(fit, 'f0')} | {cell(fit, 'f1', 1e5)} | "
-            f"{cell(fit, 'breakaway_ratio')} | {errors} |"
-        )
+        some.append(row(name, on, *coefficients(fit), errors))
         left = {law: left_out(records, law) for law in LAWS}
         whole = fit_cylinder_friction(records)
-        numbers = " | ".join(f"{rms(left[law]):.0f}" if left[law] else "too few" for law in LAWS)
-        area = f"{cell(whole, 'area', 1e6)} | {cell(whole, 'force_zero')}"
-        crossed.append(
-            f"| {name} | {cell(whole, 'f0')} | {cell(whole, 'f1', 1e5)} | "
-            f"{cell(whole, 'breakaway_ratio')} | {area} | {numbers} |"
-        )
-        report += [
-            "",
-            fit.fit_report(),
-            "  each pressure from all the others:",
-            *held_out_lines(left["linear"]),
-        ]
+        numbers = [f"{rms(left[law]):.0f}" if left[law] else "too few" for law in LAWS]
+        area = cell(whole, "area", 1e6), cell(whole, "force_zero")
+        every.append(row(name, *coefficients(whole), *area, *numbers))
+        crossed = held_out_lines(left["linear"])
+        report += ["", fit.fit_report(), "  each pressure from all the others:", *crossed]
         if name in found.cylinders:
             fits.append(fit)
-    print(
-        (
-            "\n| cylinder, all runs | f0 [N] | f1 [N/bar] | breakaway ratio | area [mm2] | force "
-            "zero [N] | "
-        )
-        + " | ".join(LAWS)
-        + " |"
-    )
-    print("|---|---|---|---|---|---|" + "---|" * len(LAWS))
-    print("\n".join(crossed))
-    print("\n| cylinder | depends on pressure (range) | " + " | ".join(COMPARED) + " |")
-    print("|---|---|" + "---|" * len(COMPARED))
-    for name, records in groups(found.cylinders).items():
-        compared = compare_friction_laws(records, name=name)
-        shares = " | ".join(
-            f"{compared.probabilities[law]:.3f} ({compared.held_out[law]:+.1f})" for law in COMPARED
-        )
-        low, high = compared.range
-        print(
-            f"| {name} | {compared.pressure:.3f} ({low:.2f} to "
-            f"{high:.2f}){', named' if compared.settled else ''} | {shares} |"
-        )
-        report += ["", compared.statement()]
+        told = compare_friction_laws(records, name=name)
+        shares = [f"{told.probabilities[law]:.3f} ({told.held_out[law]:+.1f})" for law in COMPARED]
+        low, high = told.range
+        named = ", named" if told.settled else ""
+        laws.append(row(name, f"{told.pressure:.3f} ({low:.2f} to {high:.2f}){named}", *shares))
+        compared += ["", told.statement()]
+    print("\n".join([*some, "", *every, "", *laws]))
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "report.txt").write_text("\n".join(report) + "\n", encoding="utf-8")
+    (folder / "report.txt").write_text("\n".join([*report, *compared]) + "\n", encoding="utf-8")
     plot_cylinders(fits).savefig(folder / "friction.png", dpi=130)
     print(f"\nwritten: {folder / 'report.txt'} and {folder / 'friction.png'}")
 

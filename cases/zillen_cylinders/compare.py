@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 from scipy.stats import norm, qmc
 
-from cases.zillen_cylinders.laws import LevelFriction, fit_cylinder_friction
+from cases.zillen_cylinders.laws import LevelFriction, columns, fit_cylinder_friction
 from cases.zillen_cylinders.record import FrictionRecord
 from pamrs.errors import RecordingError
 
@@ -77,7 +77,7 @@ class LawComparison:
     @property
     def pressure(self) -> float:
         """Probability that friction depends on pressure."""
-        return sum(p for law, p in self.probabilities.items() if "p" in COMPARED[law])
+        return _of_pressure(self.probabilities)
 
     @property
     def settled(self) -> bool:
@@ -137,22 +137,14 @@ def compare_friction_laws(records: Sequence[FrictionRecord], *, name: str = "") 
         raise RecordingError(
             f"{fitted.name}: {len(levels)} pressures; at least {_FEWEST} are needed to compare laws"
         )
-    everything = np.ones(len(levels), dtype=bool)
-    likelihoods = {law: _log_likelihoods(law, levels, 1.0) for law in COMPARED}
-    total = {law: _evidence(rows, everything) for law, rows in likelihoods.items()}
-    without = [
-        {law: _evidence(rows, np.arange(len(levels)) != k) for law, rows in likelihoods.items()}
-        for k in range(len(levels))
-    ]
+    every = np.arange(len(levels))
+    likelihoods = _likelihoods(levels)
+    total = _evidences(likelihoods, every)
+    without = [_evidences(likelihoods, every != k) for k in every]
     held = {law: sum(total[law] - part[law] for part in without) for law in COMPARED}
     tried = [total, *(without if len(levels) > _FEWEST else [])]
-    tried += [
-        {law: _evidence(_log_likelihoods(law, levels, width), everything) for law in COMPARED}
-        for width in (1 / 3, 3.0)
-    ]
-    shares = [
-        sum(p for law, p in _shares(found).items() if "p" in COMPARED[law]) for found in tried
-    ]
+    tried += [_evidences(_likelihoods(levels, width), every) for width in (1 / 3, 3.0)]
+    shares = [_of_pressure(_shares(found)) for found in tried]
     return LawComparison(
         name or fitted.name,
         _shares(total),
@@ -163,17 +155,20 @@ def compare_friction_laws(records: Sequence[FrictionRecord], *, name: str = "") 
     )
 
 
-def _log_likelihoods(law: str, levels: Sequence[LevelFriction], width: float) -> Array:
-    """Logarithm of each level's density (columns) under draws from the law's prior (rows)."""
-    friction, error, pressure, speed = (
-        np.array([getattr(level, key) for level in levels])
-        for key in ("friction", "stderr", "pressure", "speed")
-    )
+def _of_pressure(probabilities: dict[str, float]) -> float:
+    """Probability of the laws with a term of pressure."""
+    return sum(p for law, p in probabilities.items() if "p" in COMPARED[law])
+
+
+def _likelihoods(levels: Sequence[LevelFriction], width: float = 1.0) -> dict[str, Array]:
+    """For each law the logarithm of each level's density (columns) under draws from the law's
+    prior (rows).
+    """
+    pressure, friction, error, speed = columns(levels)
     size = float(np.mean(np.abs(friction)))
     draws = qmc.Sobol(6, scramble=True, seed=1).random(_DRAWS)
-    weight = (
-        width * size * norm.ppf(0.5 + 0.5 * np.clip(draws[:, :4], 1e-9, 1.0 - 1e-9))
-    )  # no friction is negative
+    # no friction is negative
+    weight = width * size * norm.ppf(0.5 + 0.5 * np.clip(draws[:, :4], 1e-9, 1.0 - 1e-9))
     scatter = size * _SCATTER[0] * (_SCATTER[1] / _SCATTER[0]) ** draws[:, 4]
     scale = speed.mean() * _SPEEDS[0] * (_SPEEDS[1] / _SPEEDS[0]) ** draws[:, 5]
     falling = np.exp(-speed / scale[:, None])
@@ -183,15 +178,19 @@ def _log_likelihoods(law: str, levels: Sequence[LevelFriction], width: float) ->
         "v": weight[:, 2:3] * speed / speed.mean(),
         "s": weight[:, 3:4] * falling / np.exp(-speed.mean() / scale)[:, None],
     }
-    model = np.sum([terms[term] for term in COMPARED[law]], axis=0)
-    return np.asarray(
-        norm.logpdf(friction, model, np.hypot(scatter[:, None], error)), dtype=np.float64
-    )
+    spread = np.hypot(scatter[:, None], error)
+    return {
+        law: np.asarray(norm.logpdf(friction, np.sum([terms[term] for term in of], axis=0), spread))
+        for law, of in COMPARED.items()
+    }
 
 
-def _evidence(rows: Array, used: NDArray[np.bool_]) -> float:
-    """Logarithm of the likelihood of some levels, averaged over the prior."""
-    return float(logsumexp(rows[:, used].sum(axis=1)) - np.log(len(rows)))
+def _evidences(likelihoods: dict[str, Array], used: NDArray[np.generic]) -> dict[str, float]:
+    """Logarithm of the likelihood of some levels under each law, averaged over its prior."""
+    return {
+        law: float(logsumexp(rows[:, used].sum(axis=1)) - np.log(len(rows)))
+        for law, rows in likelihoods.items()
+    }
 
 
 def _shares(evidence: dict[str, float]) -> dict[str, float]:

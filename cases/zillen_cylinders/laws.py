@@ -9,9 +9,10 @@ within a pressure, pressures the independent observations of the law.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from itertools import pairwise
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,14 +28,12 @@ from cases.zillen_cylinders.strokes import (
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit.levels import LawParameter, fit_levels
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 __all__ = [
     "LAWS",
     "CylinderFriction",
     "HeldOut",
     "LevelFriction",
+    "columns",
     "fit_cylinder_friction",
     "mean_of_series",
 ]
@@ -186,6 +185,11 @@ class CylinderFriction:
     issues: list[str]
 
     @property
+    def every_level(self) -> list[LevelFriction]:
+        """The pressures of the fit, then those left out."""
+        return [*self.levels, *self.held_out_levels]
+
+    @property
     def area(self) -> float:
         """Piston area [m2]."""
         return self.params["area"].value
@@ -229,8 +233,7 @@ class CylinderFriction:
                 raise ParameterError(f"{word}: a value is not finite")
         if v is None and self.law == "linear_speed":
             raise ParameterError("velocity is needed: the law linear_speed depends on it")
-        speed = np.zeros_like(p) if v is None else np.abs(v)
-        p, speed = np.broadcast_arrays(p, speed)
+        p, speed = np.broadcast_arrays(p, 0.0 if v is None else np.abs(v))
         size: Array = _design(self.law, p, speed) @ self._coefficients()
         return size if v is None else np.sign(v) * size
 
@@ -274,12 +277,10 @@ class CylinderFriction:
         RecordingError
             If the others do not determine the law.
         """
-        records = [pairs.record for pairs in self.pairs.values()]
         found = []
-        for record in records:
-            rest = [pairs for name, pairs in self.pairs.items() if name != record.name]
-            fit = _fit(self.name, rest, [self.pairs[record.name]], self.law, self._given_area())
-            found += fit.held_out()
+        for name, pairs in self.pairs.items():
+            rest = [other for key, other in self.pairs.items() if key != name]
+            found += _fit(self.name, rest, [pairs], self.law, self._given_area()).held_out()
         return found
 
     def fit_report(self) -> str:
@@ -287,12 +288,6 @@ class CylinderFriction:
         from cases.zillen_cylinders.report import report_text
 
         return report_text(self)
-
-    def plot(self) -> Figure:
-        """Friction over pressure and one loop; needs matplotlib."""
-        from cases.zillen_cylinders.figure import plot_cylinders
-
-        return plot_cylinders([self])
 
     def _given_area(self) -> float | None:
         return None if "force_zero" in self.params else self.area
@@ -306,10 +301,9 @@ class CylinderFriction:
         stderr = math.sqrt(float(row @ self.covar @ row) + extra**2 + level.stderr**2)
         value = float(row @ self._coefficients())
         ratio = self.params.get("breakaway_ratio")
+        broken = None if ratio is None else ratio.value * value
         outside = not self.pressures.min() <= level.pressure <= self.pressures.max()
-        return HeldOut(
-            level, value, stderr, None if ratio is None else ratio.value * value, outside
-        )
+        return HeldOut(level, value, stderr, broken, outside)
 
 
 def fit_cylinder_friction(
@@ -365,12 +359,14 @@ def fit_cylinder_friction(
         raise ParameterError(
             f"records: {twice[0]!r} is there twice; every run needs a name of its own"
         )
-    pairs = sorted(
-        (pair_strokes(record, margin=margin) for record in records), key=lambda item: item.pressure
-    )
+    pairs = _by_pressure(pair_strokes(record, margin=margin) for record in records)
     chosen = _chosen(pairs, fit_on)
     rest = [item for item in pairs if item not in chosen]
     return _fit(owners[0], chosen, rest, law, area)
+
+
+def _by_pressure(pairs: Iterable[StrokePairs]) -> list[StrokePairs]:
+    return sorted(pairs, key=lambda item: item.pressure)
 
 
 def _chosen(pairs: list[StrokePairs], fit_on: Sequence[float] | None) -> list[StrokePairs]:
@@ -385,37 +381,19 @@ def _chosen(pairs: list[StrokePairs], fit_on: Sequence[float] | None) -> list[St
                 f"fit_on: no run at {pressure / 1e3:g} kPa; there are runs at {have} kPa"
             )
         found += [item for item in near if item not in found]
-    return sorted(found, key=lambda item: item.pressure)
+    return _by_pressure(found)
 
 
 def _fit(
     name: str, chosen: list[StrokePairs], rest: list[StrokePairs], law: str, area: float | None
 ) -> CylinderFriction:
     terms = LAWS[law]
-    distinct = 1 + sum(
-        b.pressure - a.pressure > _SAME * b.pressure
-        for a, b in zip(chosen[:-1], chosen[1:], strict=True)
-    )
-    if distinct < len(terms):
-        have = ", ".join(f"{item.pressure / 1e3:.0f}" for item in chosen)
-        what = (
-            "the slope f1 of friction over pressure is"
-            if distinct == 1
-            else f"the {len(terms)} coefficients of the law {law!r} are"
-        )
-        raise RecordingError(
-            f"{name}: {distinct} pressure{'s' if distinct > 1 else ''} ({have} kPa): {what} not "
-            "determinable"
-        )
-    issues = [issue for item in [*chosen, *rest] for issue in (*item.record.issues, *item.issues)]
+    _check_determined(name, chosen, law)
+    every = _by_pressure([*chosen, *rest])
     extent = _area(name, chosen, area)
-    levels, left = (
-        [_level(item, extent["area"].value) for item in part] for part in (chosen, rest)
-    )
-    pressure, friction, stderr, speed = (
-        np.array([getattr(x, k) for x in levels])
-        for k in ("pressure", "friction", "stderr", "speed")
-    )
+    size = extent["area"].value
+    levels, left = ([_level(item, size) for item in part] for part in (chosen, rest))
+    pressure, friction, stderr, speed = columns(levels)
     if law == "linear_speed" and abs(_correlation(levels)) > _COLLINEAR:
         raise RecordingError(
             f"{name}: speed and pressure have a correlation of {_correlation(levels):.2f} over the "
@@ -443,12 +421,36 @@ def _fit(
         redchi=line.redchi,
         between=line.between,
         covar=line.covar,
-        pairs={
-            item.record.name: item
-            for item in sorted([*chosen, *rest], key=lambda item: item.pressure)
-        },
-        issues=issues,
+        pairs={item.record.name: item for item in every},
+        issues=[
+            issue for item in (*chosen, *rest) for issue in (*item.record.issues, *item.issues)
+        ],
     )
+
+
+def _check_determined(name: str, chosen: list[StrokePairs], law: str) -> None:
+    """Refuse fewer different pressures than the law has coefficients."""
+    terms, pressures = LAWS[law], [item.pressure for item in chosen]
+    distinct = 1 + sum(b - a > _SAME * b for a, b in pairwise(pressures))
+    if distinct >= len(terms):
+        return
+    what = f"the {len(terms)} coefficients of the law {law!r} are"
+    if distinct == 1:
+        what = "the slope f1 of friction over pressure is"
+    have = ", ".join(f"{pressure / 1e3:.0f}" for pressure in pressures)
+    raise RecordingError(
+        f"{name}: {distinct} pressure{'s' if distinct > 1 else ''} ({have} kPa): {what} not "
+        "determinable"
+    )
+
+
+def columns(levels: Sequence[LevelFriction]) -> tuple[Array, Array, Array, Array]:
+    """Pressure [Pa], friction and its standard error [N] and speed [m/s] of some levels."""
+    pressure, friction, stderr, speed = (
+        np.array([getattr(level, key) for level in levels])
+        for key in ("pressure", "friction", "stderr", "speed")
+    )
+    return pressure, friction, stderr, speed
 
 
 def _area(name: str, pairs: list[StrokePairs], area: float | None) -> dict[str, LawParameter]:
@@ -500,27 +502,22 @@ def _breakaway(levels: list[LevelFriction]) -> dict[str, LawParameter]:
     """Mean ratio of the sampled breakaway peaks to the sliding friction; its error from their
     scatter, NaN for one alone.
     """
-    ratios = np.array(
-        [level.breakaway / level.friction for level in levels if level.breakaway is not None]
-    )
-    if not len(ratios):
+    ratios = [level.breakaway / level.friction for level in levels if level.breakaway is not None]
+    if not ratios:
         return {}
     error = float(np.std(ratios, ddof=1) / math.sqrt(len(ratios))) if len(ratios) > 1 else math.nan
     return {"breakaway_ratio": LawParameter("breakaway_ratio", float(np.mean(ratios)), error, "1")}
 
 
 def _design(law: str, pressure: Array, speed: Array) -> Array:
-    columns = {"f0": np.ones_like(pressure), "f1": pressure, "f2": pressure**2, "fv": speed}
-    return np.stack([columns[key] for key, _ in LAWS[law]], axis=-1)
+    terms = {"f0": np.ones_like(pressure), "f1": pressure, "f2": pressure**2, "fv": speed}
+    return np.stack([terms[key] for key, _ in LAWS[law]], axis=-1)
 
 
 def _correlation(levels: Sequence[LevelFriction]) -> float:
     if len(levels) < 3:
         return math.nan
-    pressure, speed = (
-        np.array([level.pressure for level in levels]),
-        np.array([level.speed for level in levels]),
-    )
+    pressure, _, _, speed = columns(levels)
     if np.ptp(speed) == 0.0:
         return 0.0
     return float(np.corrcoef(pressure, speed)[0, 1])

@@ -98,14 +98,9 @@ class FrictionRecord:
             If the columns differ in length, look like another unit, or fewer than 20 rows are
             usable.
         """
+        given = {"time": time, "position": position, "pressure": pressure, "force": force}
         columns = {
-            word: np.asarray(values, dtype=np.float64).ravel()
-            for word, values in (
-                ("time", time),
-                ("position", position),
-                ("pressure", pressure),
-                ("force", force),
-            )
+            word: np.asarray(values, dtype=np.float64).ravel() for word, values in given.items()
         }
         sizes = [len(values) for values in columns.values()]
         if len(set(sizes)) != 1:
@@ -128,11 +123,8 @@ class FrictionRecord:
             reason[beyond & (reason == "")] = f"{word} out of range"
         stamps = columns["time"]
         latest = np.maximum.accumulate(np.where(reason == "", stamps, -np.inf))
-        late = (
-            np.concatenate([[False], stamps[1:] <= latest[:-1]])
-            if len(stamps)
-            else np.zeros(0, dtype=bool)
-        )
+        late = np.zeros(sizes[0], dtype=bool)
+        late[1:] = stamps[1:] <= latest[:-1]
         reason[late & (reason == "")] = "time does not advance"
         used = np.asarray(reason == "", dtype=bool)
         if used.sum() < 20:
@@ -146,10 +138,7 @@ class FrictionRecord:
         return cls(
             name=name,
             cylinder=cylinder,
-            time=stamps,
-            position=columns["position"],
-            pressure=columns["pressure"],
-            force=columns["force"],
+            **columns,
             used=used,
             reason=tuple(reason),
             gaps=gaps,
@@ -206,15 +195,8 @@ class CylinderFolder:
     def issues(self) -> list[str]:
         """What was found, in words."""
         found = [f"{gone} equals {kept} byte for byte: left out" for gone, kept in self.duplicates]
-        return [
-            *found,
-            *(
-                issue
-                for records in self.cylinders.values()
-                for record in records
-                for issue in record.issues
-            ),
-        ]
+        every = [record for records in self.cylinders.values() for record in records]
+        return [*found, *(issue for record in every for issue in record.issues)]
 
 
 def load_friction_record(

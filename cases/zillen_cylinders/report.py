@@ -36,10 +36,8 @@ def report_text(fit: CylinderFriction) -> str:
     str
         Lines of plain text.
     """
-    lines = [
-        f"{fit.name}: friction law {fit.law!r}, {fit.ndata} pressures, {fit.nvarys} coefficients, "
-        f"{fit.nfree} to spare"
-    ]
+    counts = f"{fit.ndata} pressures, {fit.nvarys} coefficients, {fit.nfree} to spare"
+    lines = [f"{fit.name}: friction law {fit.law!r}, {counts}"]
     lines += [f"  {_coefficient(parameter)}" for parameter in fit.params.values()]
     if fit.nfree:
         lines.append(
@@ -57,10 +55,8 @@ def report_text(fit: CylinderFriction) -> str:
         "(ripple)  from rest"
     )
     held_out = fit.held_out()
-    rows = [
-        *zip(fit.levels, fit.best_fit.tolist(), strict=True),
-        *((item.level, item.predicted) for item in held_out),
-    ]
+    rows = list(zip(fit.levels, fit.best_fit.tolist(), strict=True))
+    rows += [(item.level, item.predicted) for item in held_out]
     for level, law in rows:
         before, after = _level(level)
         lines.append(f"  {before}{law:9.2f}{after}{'' if level in fit.levels else '  (held out)'}")
@@ -93,10 +89,8 @@ def held_out_lines(found: list[HeldOut]) -> list[str]:
         if item.extrapolated:
             text += ", extrapolated"
         if item.breakaway is not None and level.breakaway is not None:
-            text += (
-                f"; breakaway {item.breakaway:.1f} N, measured "
-                f"{_bound(level)}{level.breakaway:.1f} N"
-            )
+            measured = f"{_bound(level)}{level.breakaway:.1f} N"
+            text += f"; breakaway {item.breakaway:.1f} N, measured {measured}"
         lines.append(text)
     return lines
 
@@ -147,9 +141,8 @@ def _limits(fit: CylinderFriction) -> list[str]:
             f"{100.0 * most.drift:+.0f} % in {most.name}: the strokes are no independent repeats, "
             "and count as fewer"
         )
-    unsure = [
-        level for level in fit.levels if level.rest is not None and level.rest.status == "at least"
-    ]
+    rests = [level.rest for level in fit.levels if level.rest is not None]
+    unsure = [rest for rest in rests if rest.status == "at least"]
     if unsure and "breakaway_ratio" in fit.params:
         said.append(
             f"breakaway_ratio is a lower bound: the logger paused at the start of {len(unsure)} of "

@@ -10,6 +10,7 @@ difference between the frictions of the two directions is not separable from ``A
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -172,10 +173,10 @@ def find_strokes(record: FrictionRecord) -> list[Stroke]:
         raise RecordingError(
             f"{record.name}: the motion never reverses; friction needs both directions of motion"
         )
-    strokes = []
-    for start, stop in zip(turns[:-1], turns[1:], strict=True):
-        strokes.append(Stroke(1 if position[stop] > position[start] else -1, start, stop))
-    return strokes
+    return [
+        Stroke(1 if position[stop] > position[start] else -1, start, stop)
+        for start, stop in pairwise(turns)
+    ]
 
 
 def pair_strokes(record: FrictionRecord, *, margin: float = 0.25) -> StrokePairs:
@@ -287,19 +288,13 @@ def onset_at_rest(pairs: StrokePairs, area: float) -> Onset | None:
     ratio, row, ripple = _peak(pairs, stroke, middle, area, onset=_BREAKAWAY)
     peak, moved = ratio * middle[1], abs(float(position[row] - position[stroke.start]))
     travel = float(np.ptp(position))
-    begin = stroke.start + int(
-        np.argmax(
-            np.abs(position[stroke.start : stroke.stop] - position[stroke.start])
-            > _BREAKAWAY * travel
-        )
-    )
+    away = np.abs(position[stroke.start : stroke.stop] - position[stroke.start])
+    begin = stroke.start + int(np.argmax(away > _BREAKAWAY * travel))
     steps = np.diff(time[stroke.start : begin + 1])
     usual = float(np.median(np.diff(time)))
     head = slice(stroke.start, stroke.start + 4)
     if np.all(np.diff(time[head]) < 2.0 * usual):
-        early = abs(float(position[head][-1] - position[head][0])) / float(
-            time[head][-1] - time[head][0]
-        )
+        early = float(np.ptp(position[head][[0, -1]]) / np.ptp(time[head][[0, -1]]))
         if early > _MOVING * _speed(stroke, time, position, pairs.window):
             return Onset(peak, ratio, ripple, row, moved, "in motion")
     cut = bool(np.max(steps, initial=0.0) > 5.0 * usual)
@@ -361,10 +356,8 @@ def _middle(pairs: StrokePairs, first: int, second: int, area: float) -> tuple[A
     """
     _, position, pressure, force = pairs.record.rows()
     grid = np.linspace(*pairs.window, _GRID)
-    net = force - area * pressure
-    a, b = (
-        _onto(grid, pairs.strokes[k], position, net, pressure, np.inf)[0] for k in (first, second)
-    )
+    net, strokes = force - area * pressure, (pairs.strokes[first], pairs.strokes[second])
+    a, b = (_onto(grid, stroke, position, net, pressure, np.inf)[0] for stroke in strokes)
     return np.polyfit(grid, 0.5 * (a + b), 1), 0.5 * abs(float(np.mean(a - b)))
 
 
@@ -378,17 +371,13 @@ def _peak(
     rows = np.arange(stroke.start, stroke.stop + 1)
     line, friction = middle
     x = position[rows]
-    excess = (
-        pairs.sign
-        * stroke.direction
-        * (force[rows] - area * pressure[rows] - np.polyval(line, x))
-        / friction
-    )
+    pull = force[rows] - area * pressure[rows] - np.polyval(line, x)
+    excess = pairs.sign * stroke.direction * pull / friction
     moved = np.abs(x - x[0])
-    early = np.flatnonzero(moved <= onset * float(np.ptp(position)))
+    width = onset * float(np.ptp(position))
+    early = np.flatnonzero(moved <= width)
     top = int(early[np.argmax(excess[early])])
     inside = (x >= pairs.window[0]) & (x <= pairs.window[1])
-    width = onset * float(np.ptp(position))
     bins = ((moved[inside] - moved[inside].min()) / width).astype(int)
     ripple = float(np.mean([np.max(excess[inside][bins == b]) for b in np.unique(bins)]))
     return float(excess[top]), int(rows[top]), ripple

@@ -17,34 +17,14 @@ from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit.levels import fit_levels
 from tests.tables import rows_of
 
-DATA = (
-    Path(__file__).parents[2]
-    / ".."
-    / "shared"
-    / "recordings"
-    / "pneumatic_cylinders_zillen"
-    / "results_pneumatic-actuator"
-    / "data"
-    / "friction"
-)
+SHARED = Path(__file__).parents[2] / "../shared/recordings/pneumatic_cylinders_zillen"
+DATA = SHARED / "results_pneumatic-actuator/data/friction"
 AREA, ZERO, F0, F1, RATIO = 5.0e-4, 1.5, 3.0, 8e-6, 1.8
 PRESSURES = (1e5, 2e5, 4e5, 5e5, 7e5)
 STEP, STROKE = 0.01, 0.036
 
 
-def run(
-    pressure,
-    *,
-    seed=0,
-    scatter=0.02,
-    between=0.0,
-    cycles=5,
-    breakaway=RATIO,
-    name=None,
-    tilt=0.0,
-    speeds=(0.02, 0.03),
-    sign=1,
-):
+def run(pressure, *, seed=0, scatter=0.02, between=0.0, cycles=5, speeds=(0.02, 0.03)):
     """A run with friction F0 + F1 p: at rest, then to and fro; the regulator lags by 4 kPa to each
     side.
     """
@@ -57,24 +37,19 @@ def run(
             x = np.arange(0.0, STROKE, speed * STEP)
             x = x if way > 0 else STROKE - x
             position.append(x)
-            force.append(
-                way
-                * factor
-                * friction
-                * np.clip(np.abs(x - x[0]) / 4e-4, 0.0, 1.0) ** (0.5 if len(force) > 1 else 0.0)
-            )
+            begun = np.clip(np.abs(x - x[0]) / 4e-4, 0.0, 1.0)
+            pull = way * factor * friction
+            force.append(pull * begun ** (0.5 if len(force) > 1 else 0.0))
             gas.append(np.full(len(x), way * 4e3))
     position, force, gas = (np.concatenate(part) for part in (position, force, gas))
-    force[16:19] = friction * np.array([0.7, 1.0, 0.9]) * breakaway
+    force[16:19] = friction * np.array([0.7, 1.0, 0.9]) * RATIO
     gas = gas + pressure
-    force = ZERO + AREA * gas * (1.0 + tilt * (position / STROKE - 0.5)) + force
+    force = ZERO + AREA * gas + force
     noise = 0.003 * rng.standard_normal(len(force))
     time = STEP * np.arange(len(force))
-    label = name or f"run_{pressure / 1e5:.0f}bar"
     position = position + 2e-6 * rng.standard_normal(len(position))
-    return FrictionRecord.from_arrays(
-        time, sign * position, gas, force + noise, name=label, cylinder="made"
-    )
+    names = {"name": f"run_{pressure / 1e5:.0f}bar", "cylinder": "made"}
+    return FrictionRecord.from_arrays(time, position, gas, force + noise, **names)
 
 
 def runs(**options):
@@ -133,11 +108,8 @@ def test_standard_errors_tell_the_truth():
         fit = fit_cylinder_friction(records, area=AREA)
         slope = fit.params["f1"]
         slopes.append((slope.value - F1) / slope.stderr)
-        held_out += [
-            item.error / item.stderr
-            for item in fit.leave_one_pressure_out()
-            if not item.extrapolated
-        ]
+        crossed = (item for item in fit.leave_one_pressure_out() if not item.extrapolated)
+        held_out += [item.error / item.stderr for item in crossed]
     # a scatter that only the levels show, two or three of them to spare: Student's tails, so
     # medians and wide limits
     assert 0.7 < float(np.std(slopes)) < 1.6
@@ -160,16 +132,17 @@ def test_held_out_pressures_are_predicted_with_their_error():
 
 def test_a_pause_of_the_logger_hides_the_breakaway():
     whole = run(3e5)
-    rows = np.r_[0:15, 22 : len(whole)]
-    parts = [values[rows] for values in (whole.time, whole.position, whole.pressure, whole.force)]
-    pairs = pair_strokes(FrictionRecord.from_arrays(*parts))
-    onset = onset_at_rest(pairs, AREA)
-    assert onset is not None
-    assert onset.status == "missed"
-    rows = np.r_[0:18, 25 : len(whole)]
-    parts = [values[rows] for values in (whole.time, whole.position, whole.pressure, whole.force)]
-    onset = onset_at_rest(pair_strokes(FrictionRecord.from_arrays(*parts)), AREA)
-    assert onset is not None
+
+    def onset_without(first, last):
+        rows = np.r_[0:first, last : len(whole)]
+        columns = (whole.time, whole.position, whole.pressure, whole.force)
+        record = FrictionRecord.from_arrays(*(values[rows] for values in columns))
+        onset = onset_at_rest(pair_strokes(record), AREA)
+        assert onset is not None
+        return onset
+
+    assert onset_without(15, 22).status == "missed"
+    onset = onset_without(18, 25)
     assert onset.status == "at least"
     assert onset.ratio == pytest.approx(RATIO, rel=0.05)
 
@@ -178,10 +151,8 @@ def test_speed_and_pressure_are_told_apart_only_if_they_vary_apart():
     together = [run(p, speeds=(0.02 + 2e-8 * p, 0.03)) for p in PRESSURES]
     with pytest.raises(RecordingError, match="speed and pressure have a correlation of 1.00"):
         fit_cylinder_friction(together, law="linear_speed")
-    apart = [
-        run(p, speeds=(v, v))
-        for p, v in zip(PRESSURES, (0.02, 0.04, 0.03, 0.02, 0.03), strict=True)
-    ]
+    speeds = zip(PRESSURES, (0.02, 0.04, 0.03, 0.02, 0.03), strict=True)
+    apart = [run(p, speeds=(v, v)) for p, v in speeds]
     fit = fit_cylinder_friction(apart, law="linear_speed")
     assert abs(fit.params["fv"].value) < 3.0 * fit.params["fv"].stderr
     with pytest.raises(ParameterError, match="velocity is needed"):
@@ -202,8 +173,7 @@ def test_figure(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
-    rows_of(__file__, "what_the_runs_do_not_determine_is_named"),
+    ("options", "message"), rows_of(__file__, "what_the_runs_do_not_determine_is_named")
 )
 def test_what_the_runs_do_not_determine_is_named(options, message):
     with pytest.raises(RecordingError, match=message):
@@ -214,15 +184,9 @@ def test_what_the_runs_do_not_determine_is_named(options, message):
 
 
 def write(path, record):
-    table = np.column_stack(
-        [
-            record.time * 1e3,
-            *[np.zeros(len(record))] * 3,
-            record.position * 1e3,
-            record.pressure / 1e5,
-            record.force,
-        ]
-    )
+    spare = [np.zeros(len(record))] * 3
+    measured = [record.position * 1e3, record.pressure / 1e5, record.force]
+    table = np.column_stack([record.time * 1e3, *spare, *measured])
     np.savetxt(path, table, fmt="%.6f", delimiter="\t")
 
 
@@ -243,13 +207,12 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(RecordingError, match="no file NAME_Nbar.csv is there"):
         load_friction_folder(tmp_path)
     write(tmp_path / "A_1bar.csv", run(1e5))
-    with pytest.raises(RecordingError, match="columns lists 2 names, but there are 7 columns"):
-        load_friction_record(tmp_path / "A_1bar.csv", columns=("time [ms]", "force [N]"))
-    with pytest.raises(RecordingError, match="columns names no position"):
-        load_friction_record(
-            tmp_path / "A_1bar.csv",
-            columns=("time [ms]", "", "", "", "", "pressure [bar]", "force [N]"),
-        )
+    for columns, message in (
+        (("time [ms]", "force [N]"), "columns lists 2 names, but there are 7 columns"),
+        (("time [ms]", *[""] * 4, "pressure [bar]", "force [N]"), "columns names no position"),
+    ):
+        with pytest.raises(RecordingError, match=message):
+            load_friction_record(tmp_path / "A_1bar.csv", columns=columns)
 
 
 # -------------------------------------------------------------------------- real set
@@ -259,12 +222,8 @@ def test_files_that_cannot_be_read(tmp_path):
 def test_real_cylinders():
     found = load_friction_folder(DATA)
     assert found.duplicates == [(f"O-ring_{bar}bar", f"Circle_{bar}bar") for bar in (1, 3, 5, 7)]
-    assert {name: len(records) for name, records in found.cylinders.items()} == {
-        "Circle": 7,
-        "Kidney_lc": 7,
-        "O-ring257": 4,
-        "X-ring257": 4,
-    }
+    counts = {name: len(records) for name, records in found.cylinders.items()}
+    assert counts == {"Circle": 7, "Kidney_lc": 7, "O-ring257": 4, "X-ring257": 4}
     kidney = fit_cylinder_friction(found.cylinders["Kidney_lc"], fit_on=(1e5, 4e5, 7e5))
     assert max(abs(item.relative_error) for item in kidney.held_out()) < 0.10
     ring = fit_cylinder_friction(found.cylinders["O-ring257"])
@@ -272,14 +231,8 @@ def test_real_cylinders():
     assert ring.area == pytest.approx(np.pi / 4 * 0.0257**2, rel=0.01)
     # the X-ring is linear up to 5 bar, and then it is not: the law must say so
     sealed = found.cylinders["X-ring257"]
-    assert (
-        abs(
-            fit_cylinder_friction(sealed, fit_on=(1e5, 3e5), area=ring.area)
-            .held_out()[0]
-            .relative_error
-        )
-        < 0.05
-    )
+    (far,) = fit_cylinder_friction(sealed[:3], fit_on=(1e5, 3e5), area=ring.area).held_out()
+    assert abs(far.relative_error) < 0.05
     whole = fit_cylinder_friction(sealed)
     assert whole.between > 1.0
     assert whole.redchi > 10.0
@@ -293,9 +246,8 @@ def test_real_cylinders():
 
 def test_pressure_is_named_where_speed_does_not_go_with_it():
     speeds = [(0.02, 0.03), (0.03, 0.045), (0.018, 0.026), (0.028, 0.04), (0.022, 0.03)]
-    records = [
-        run(p, scatter=0.01, between=0.01, speeds=s) for p, s in zip(PRESSURES, speeds, strict=True)
-    ]
+    pairs = zip(PRESSURES, speeds, strict=True)
+    records = [run(p, scatter=0.01, between=0.01, speeds=s) for p, s in pairs]
     found = compare_friction_laws(records, name="made")
     assert found.settled
     assert found.pressure > 0.98
@@ -305,9 +257,8 @@ def test_pressure_is_named_where_speed_does_not_go_with_it():
 
 
 def test_pressure_is_not_named_where_speed_falls_with_it():
-    records = [
-        run(p, scatter=0.01, speeds=(0.04 - 8e-8 * p, 0.05 - 1e-7 * p)) for p in (2e5, 3e5, 4e5)
-    ]
+    falling = {p: (0.04 - 8e-8 * p, 0.05 - 1e-7 * p) for p in (2e5, 3e5, 4e5)}
+    records = [run(p, scatter=0.01, speeds=speeds) for p, speeds in falling.items()]
     found = compare_friction_laws(records)
     assert not found.settled
     assert found.probabilities["stribeck"] > 0.03

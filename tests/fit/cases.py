@@ -36,6 +36,32 @@ def muscle(model="kothera", order=2, **changes):
     return Muscle(**{**SHAPE, "model": model, **own, **changes})
 
 
+def grid(*axes):
+    """Every combination of the values of some axes, (n,) arrays."""
+    return tuple(axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
+
+
+def mapped(pressure, contraction, force, rest=REST, **options):
+    """A force map over contractions."""
+    length = rest * (1.0 - np.asarray(contraction))
+    return ForceMap.from_arrays(
+        length=length, pressure=pressure, force=force, rest_length=rest, **options
+    )
+
+
+def remade(data, rows=slice(None), **changes):
+    """A force map anew from some rows of another, with other columns or options."""
+    columns = {name: getattr(data, name)[rows] for name in ("length", "pressure", "force")}
+    return ForceMap.from_arrays(**{**columns, "rest_length": data.rest_length, **changes})
+
+
+def joined(*maps, **changes):
+    """One force map of the rows of several, with their directions."""
+    names = ("length", "pressure", "force", "direction")
+    columns = {name: np.concatenate([getattr(map_, name) for map_ in maps]) for name in names}
+    return ForceMap.from_arrays(**{**columns, "rest_length": maps[0].rest_length, **changes})
+
+
 def measure(
     of,
     *,
@@ -47,17 +73,20 @@ def measure(
     rest=REST,
 ):
     """A force map of a muscle, with Gaussian noise [N]."""
-    p, e = (grid.ravel() for grid in np.meshgrid(pressures, contractions, indexing="ij"))
+    p, e = grid(pressures, contractions)
     force = of.force(p, e) if direction is None else of.force(p, e, direction=direction)
     force = force + noise * np.random.default_rng(seed).standard_normal(len(p))
     ways = None if direction is None else np.full(len(p), direction)
+    length = of.parameters["rest_length"] * (1.0 - e)
     return ForceMap.from_arrays(
-        length=of.parameters["rest_length"] * (1.0 - e),
-        pressure=p,
-        force=force,
-        rest_length=rest,
-        direction=ways,
+        length=length, pressure=p, force=force, rest_length=rest, direction=ways
     )
+
+
+def loops(of, *, noise=0.0, seeds=(0, 0)):
+    """A force map of both branches of a muscle, the contracting ones first."""
+    ways = zip((-1.0, 1.0), seeds, strict=True)
+    return joined(*(measure(of, direction=way, noise=noise, seed=seed) for way, seed in ways))
 
 
 def truth(of, fit):
@@ -71,8 +100,3 @@ def truth(of, fit):
             for name in fit.params
         ]
     )
-
-
-def named(columns):
-    """Columns of a force map by their names."""
-    return dict(zip(("length", "pressure", "force"), columns, strict=True))

@@ -11,10 +11,11 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 import pamrs
-from pamrs import cli
 from pamrs.errors import ParameterError, RecordingError, RigError
 from pamrs.fit import ForceMap, fit_map
 from pamrs.rig import force_table, load_rig, parse_rig
+from tests.fit.cases import mapped, remade
+from tests.scripts import command
 
 SIZES: dict[str, Any] = {
     "rest_length": 0.25,
@@ -39,9 +40,7 @@ def rows(noise: float = 0.0, half_width: float = 0.0, seed: int = 0) -> ForceMap
     way = np.tile(np.repeat([-1.0, 1.0], 60), len(LEVELS))
     p = np.repeat(LEVELS, 120)
     force = law(p, e) + way * half_width + noise * rng.normal(size=len(p))
-    return ForceMap.from_arrays(
-        length=0.25 * (1.0 - e), pressure=p, force=force, rest_length=0.25, direction=way
-    )
+    return mapped(p, e, force, 0.25, direction=way)
 
 
 def reference(p_axis: Any, e_axis: Any, force: Any, p: float, e: float) -> float:
@@ -58,14 +57,8 @@ def reference(p_axis: Any, e_axis: Any, force: Any, p: float, e: float) -> float
     j = int(np.clip(np.searchsorted(e_axis, e, "right") - 1, 0, len(e_axis) - 2))
 
     def weights(x: float, width: float) -> Any:
-        return np.array(
-            [
-                (1 + 2 * x) * (1 - x) ** 2,
-                x * x * (3 - 2 * x),
-                width * x * (1 - x) ** 2,
-                width * x * x * (x - 1),
-            ]
-        )
+        value = [(1 + 2 * x) * (1 - x) ** 2, x * x * (3 - 2 * x)]
+        return np.array([*value, width * x * (1 - x) ** 2, width * x * x * (x - 1)])
 
     hp, he = p_axis[i + 1] - p_axis[i], e_axis[j + 1] - e_axis[j]
     u, v = weights((p - p_axis[i]) / hp, hp), weights((e - e_axis[j]) / he, he)
@@ -128,18 +121,16 @@ def test_a_table_of_the_shoulders_own_muscle_moves_it_alike() -> None:
     muscle = rig.muscle
     assert muscle is not None
     high = muscle.contraction_range[1]
-    mapped = pamrs.Muscle.from_law(
+    names = ("rest_length", "rest_diameter", "braid_angle", "wall_thickness")
+    own = pamrs.Muscle.from_law(
         lambda p, e: muscle.force_table(p, e),
         max_pressure=14e5,
         contraction=(0.0, min(high, 0.34)),  # the model has a kink at rest
         tolerance=1e-5,
-        **{
-            name: muscle.parameters[name]
-            for name in ("rest_length", "rest_diameter", "braid_angle", "wall_thickness")
-        },
+        **{name: muscle.parameters[name] for name in names},
         geometry=muscle.geometry,
     )
-    other = with_muscle(rig, mapped)
+    other = with_muscle(rig, own)
     u = 5.0 + np.where(np.arange(400) % 200 < 60, 1.5, -0.4)
     runs = [pamrs.simulate(r, valve_command=u, sample_time=0.005) for r in (rig, other)]
     angle = [run["joint_angle"] for run in runs]
@@ -197,13 +188,7 @@ def test_measured_rows_become_a_monotone_table_with_their_scatter() -> None:
     assert "N rms: hysteresis" in fit.fit_report()
     whole = rows(noise=4.0, half_width=6.0)
     order = np.random.default_rng(9).permutation(len(whole.force))
-    mixed = ForceMap.from_arrays(
-        length=whole.length[order],
-        pressure=whole.pressure[order],
-        force=whole.force[order],
-        rest_length=0.25,
-    )
-    alike = fit_map(mixed)  # nobody knows which branch a row is of
+    alike = fit_map(remade(whole, order))  # nobody knows which branch a row is of
     assert alike.scatter == pytest.approx(np.hypot(4.0, 6.0), rel=0.12)
     assert np.isnan(alike.half_width)
     assert np.all(np.diff(fit.force, axis=0) >= 0.0)
@@ -223,13 +208,7 @@ def test_measured_rows_become_a_monotone_table_with_their_scatter() -> None:
 def test_corners_that_nobody_measured_are_said_and_go_on() -> None:
     data = rows(noise=1.0)
     keep = ~((data.pressure < 1.5e5) & (data.contraction > 0.12)) & (data.pressure > 0.0)
-    cut = ForceMap.from_arrays(
-        length=data.length[keep],
-        pressure=data.pressure[keep],
-        force=data.force[keep],
-        rest_length=0.25,
-    )
-    fit = fit_map(cut)
+    fit = fit_map(remade(data, keep))
     text = fit.fit_report()
     assert "100 kPa: rows from 0 to 11.9 % contraction; beyond, the table goes on" in text
     assert "no row below 100 kPa: there the force goes on along a straight line" in text
@@ -243,18 +222,13 @@ def test_corners_that_nobody_measured_are_said_and_go_on() -> None:
 def test_the_command_writes_a_rig_that_runs(capsys: Any, tmp_path: Any) -> None:
     data = rows(noise=4.0)
     table, rig, result = (tmp_path / name for name in ("map.csv", "rig.toml", "map.json"))
-    np.savetxt(
-        table,
-        np.column_stack([data.length * 1e3, data.pressure / 1e5, data.force]),
-        delimiter=",",
-        header="length [mm],pressure [bar],force [N]",
-        comments="",
-    )
+    columns = np.column_stack([data.length * 1e3, data.pressure / 1e5, data.force])
+    head = "length [mm],pressure [bar],force [N]"
+    np.savetxt(table, columns, delimiter=",", header=head, comments="")
     words = ["fit", "map", table, "--rest-length", "250 mm", "--rest-diameter", "20 mm"]
     words += ["--braid-angle", "1.2 rad", "--wall-thickness", "1.5 mm"]
-    words += ["--rig", rig, "--json", result]
-    assert cli.main([str(word) for word in words]) == 0
-    out = capsys.readouterr().out
+    code, out, _ = command(capsys, *words, "--rig", rig, "--json", result)
+    assert code == 0
     assert "7 pressures from 0 to 600 kPa, 20 contractions" in out
     written = load_rig(rig)
     share = json.loads(result.read_text(encoding="utf-8"))["fit"]["share"]

@@ -32,11 +32,9 @@ def test_a_prior_is_one_more_equation_for_each_coefficient():
 
 def test_a_wide_prior_moves_nothing_that_the_points_tell():
     data = measure(muscle(order=2), noise=1.0)
-    free, told = (
-        fit_muscle(data, muscle()),
-        fit_muscle(data, muscle(), tolerance={k: 1e3 * v for k, v in WIDE.items()}, noise=1.0),
-    )
-    np.testing.assert_allclose(told.x, free.x, rtol=1e-6)
+    wider = {name: 1e3 * value for name, value in WIDE.items()}
+    told = fit_muscle(data, muscle(), tolerance=wider, noise=1.0)
+    np.testing.assert_allclose(told.x, fit_muscle(data, muscle()).x, rtol=1e-6)
 
 
 def test_it_lets_an_order_be_fitted_that_the_points_do_not_determine():
@@ -44,38 +42,23 @@ def test_it_lets_an_order_be_fitted_that_the_points_do_not_determine():
     few = {"pressures": [2e5, 8e5], "contractions": [0.02, 0.12, 0.24]}
     with pytest.raises(FitError, match="6 usable points, but order 4 has 8 unknowns"):
         fit_muscle(measure(real, **few), real, order=4)
-    fit = fit_muscle(
-        measure(real, noise=1.0, **few),
-        real.replace(modulus_slope=[], modulus_offset=[]),
-        order=4,
-        tolerance=WIDE,
-        noise=1.0,
-    )
+    soft = real.replace(modulus_slope=[], modulus_offset=[])
+    data = measure(real, noise=1.0, **few)
+    fit = fit_muscle(data, soft, order=4, tolerance=WIDE, noise=1.0)
     assert fit.success
     many = measure(real)
-    assert (
-        np.abs(fit.predict(many.pressure, length=many.length) - many.force).max()
-        < 0.03 * many.force.max()
-    )
+    error = fit.predict(many.pressure, length=many.length) - many.force
+    assert np.abs(error).max() < 0.03 * many.force.max()
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
     real, inside = muscle(order=2), []
+    few = {"pressures": [2e5, 5e5, 8e5], "contractions": [0.02, 0.1, 0.2], "noise": 4.0}
+    known = {"tolerance": {"modulus_slope": 2.0, "modulus_offset": 5e5}, "noise": 4.0}
     for seed in range(60):
-        data = measure(
-            real, pressures=[2e5, 5e5, 8e5], contractions=[0.02, 0.1, 0.2], noise=4.0, seed=seed
-        )
-        fit = fit_muscle(
-            data,
-            real,
-            tolerance={"modulus_slope": 2.0, "modulus_offset": 5e5},
-            noise=4.0,
-            errors="plain",
-        )
-        inside.append(
-            np.abs(fit.x - truth(real, fit))
-            < 2.0 * np.array([p.stderr for p in fit.params.values()])
-        )
+        fit = fit_muscle(measure(real, **few, seed=seed), real, **known, errors="plain")
+        spread = np.array([p.stderr for p in fit.params.values()])
+        inside.append(np.abs(fit.x - truth(real, fit)) < 2.0 * spread)
     assert 0.9 < np.mean(inside) <= 1.0
 
 
@@ -83,54 +66,31 @@ def test_free_geometry_and_priors_go_together_and_leave_one_out_refits():
     real = muscle(order=2)
     data = measure(real, noise=2.0)
     nominal = muscle(order=2, braid_angle=real.parameters["braid_angle"] + 0.01)
-    fit = fit_muscle(
-        data, nominal, free=["braid_angle"], tolerance={**TOLERANCE, **WIDE}, noise=2.0
-    )
-    assert fit.params["braid_angle"].value == pytest.approx(
-        real.parameters["braid_angle"], abs=4 * fit.params["braid_angle"].stderr
-    )
-    others = fit_muscle(
-        data,
-        nominal,
-        free=["braid_angle"],
-        tolerance={**TOLERANCE, **WIDE},
-        noise=2.0,
-        levels=[0, 1, 2, 4, 5],
-    )
+    settings = {"free": ["braid_angle"], "tolerance": {**TOLERANCE, **WIDE}, "noise": 2.0}
+    fit = fit_muscle(data, nominal, **settings)
+    angle = fit.params["braid_angle"]
+    assert angle.value == pytest.approx(real.parameters["braid_angle"], abs=4 * angle.stderr)
+    others = fit_muscle(data, nominal, **settings, levels=[0, 1, 2, 4, 5])
     left = np.flatnonzero(data.level == 3)
     error = data.force[left] - others.predict(data.pressure[left], length=data.length[left])
     np.testing.assert_allclose(fit.leave_one_pressure_out().residual[left], error, atol=1e-3)
-    rig = fit.to_rig()
-    assert rig.parameters["muscle.braid_angle"].tol == pytest.approx(
-        fit.params["braid_angle"].stderr
-    )
+    assert fit.to_rig().parameters["muscle.braid_angle"].tol == pytest.approx(angle.stderr)
 
 
 def test_moduli_of_each_level_take_the_prior_of_their_pressure():
     real = muscle(order=2)
     data = measure(real, contractions=[0.1], pressures=[2e5, 8e5], noise=1.0)
-    fit = fit_muscle(
-        data,
-        real,
-        moduli="per_level",
-        tolerance={"modulus_slope": 1.0, "modulus_offset": 3e5},
-        noise=1.0,
-    )
+    known = {"tolerance": {"modulus_slope": 1.0, "modulus_offset": 3e5}, "noise": 1.0}
+    fit = fit_muscle(data, real, moduli="per_level", **known)
     assert fit.params["E1_200kPa"].init_value == pytest.approx(2.5 * 2e5 + 9e5)
     assert fit.params["E1_800kPa"].tolerance == pytest.approx(np.hypot(8e5, 3e5))
 
 
 def test_models_are_compared_with_the_priors_that_they_have():
     data = measure(muscle(order=2), noise=1.0)
-    table = compare_models(
-        data,
-        muscle(),
-        models=["kothera", "mooney_rivlin"],
-        orders=[4],
-        tolerance={**WIDE, "c10": 1e7},
-        noise=1.0,
-    )
-    assert {row["model"] for row in table.rows if row["rank"]} == {"kothera", "mooney_rivlin"}
+    models, known = ["kothera", "mooney_rivlin"], {**WIDE, "c10": 1e7}
+    table = compare_models(data, muscle(), models=models, orders=[4], tolerance=known, noise=1.0)
+    assert {row["model"] for row in table.rows if row["rank"]} == set(models)
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-import pamrs
-from pamrs.recordings import load_case, propose
-from tests.recordings.test_dialects import DATA, DT, EPOCH, N, date
+from tests.recordings.test_dialects import DATA, DT, EPOCH, N, date, imported
 
 PSI, AT, MERCURY, STANDARD = 6894.757293, 98066.5, 133.322387415, 101325.0
 
@@ -172,8 +170,8 @@ def rows() -> Iterator[Row]:
             yield Row(dialect, clock, UNITS[count % len(UNITS)], NAMES[count % len(NAMES)])
 
 
-def write(row: Row, file: Path) -> None:
-    """Write a log."""
+def written(row: Row) -> bytes:
+    """A log."""
     form = row.dialect
     units = (row.clock.unit, "V", row.unit.written, "deg")
     headings = [
@@ -190,21 +188,14 @@ def write(row: Row, file: Path) -> None:
     lines += body[::-1] if row.clock.newest_first else body
     quote = '"' if form.quoted else ""
     text = "".join(form.mark.join(f"{quote}{c}{quote}" for c in line) + "\r\n" for line in lines)
-    file.write_bytes((form.above + text).encode(form.encoding))
+    return (form.above + text).encode(form.encoding)
 
 
 def tried(row: Row, home: Path) -> tuple[str, str]:
     """What becomes of a log: ``right`` (every channel), ``told`` (the pressure is left to the user,
     who is told why) or ``wrong``; and what is said.
     """
-    log, rig = home / "log.csv", pamrs.rigs.shoulder()
-    write(row, log)
-    proposal = propose([log], rig)
-    (item,) = proposal.logs
-    said = "\n".join([*item.log.remarks, *item.remarks])
-    rig.to_toml(home / "rig.toml")
-    (home / "case.toml").write_text(proposal.case_toml(home), encoding="utf-8")
-    recordings = load_case(home).recordings
+    recordings, said = imported(home, written(row))
     wanted = {
         "valve_command": DATA[:, 1],
         "joint_angle": np.radians(DATA[:, 3]),

@@ -4,7 +4,6 @@ done to it is told.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -12,14 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from mcap.writer import Writer
 from numpy.typing import NDArray
 
-import pamrs
 from pamrs.errors import RecordingError
-from pamrs.recordings import Recording, load_case, load_recording, load_recordings, propose
+from pamrs.recordings import Recording, load_recording, load_recordings, propose
 from pamrs.recordings._stamps import ticks
-from pamrs.recordings.logs import TextFormat
+from tests.recordings.written import SHOULDER, case_of, write_json_messages
 
 Array = NDArray[np.float64]
 N, DT = 200, 0.02
@@ -67,28 +64,31 @@ def date(form: str, start: datetime = NOON, digits: int = 3) -> Callable[[int], 
     return written
 
 
-def changed(edit: Callable[[list[str]], Any]) -> str:
+def changed(*edits: Callable[[list[str]], Any]) -> str:
     """A plain log with some lines edited in place; line 0 has the headings."""
     lines = table("time [s]", plain).splitlines()
-    edit(lines)
+    for edit in edits:
+        edit(lines)
     return "\n".join(lines) + "\n"
 
 
+def each_row(edit: Callable[[int, list[str]], Any]) -> Callable[[list[str]], None]:
+    """An edit of the cells of every row, by its number."""
+
+    def edited(lines: list[str]) -> None:
+        for row in range(1, len(lines)):
+            parts = lines[row].split(",")
+            edit(row - 1, parts)
+            lines[row] = ",".join(parts)
+
+    return edited
+
+
 def cells(row: int, place: int, word: str) -> Callable[[list[str]], None]:
-    def edit(lines: list[str]) -> None:
-        parts = lines[row].split(",")
-        parts[place] = word
-        lines[row] = ",".join(parts)
+    def edit(at: int, parts: list[str]) -> None:
+        parts[place] = word if at == row - 1 else parts[place]
 
-    return edit
-
-
-def all_of(*edits: Callable[[list[str]], Any]) -> Callable[[list[str]], None]:
-    def edit(lines: list[str]) -> None:
-        for each in edits:
-            each(lines)
-
-    return edit
+    return each_row(edit)
 
 
 def swap(lines: list[str]) -> None:
@@ -103,26 +103,18 @@ def newest_first(lines: list[str]) -> None:
 def thin(places: dict[int, int]) -> str:
     """A log in which the cell at a place is filled in every so many rows only."""
 
-    def edit(lines: list[str]) -> None:
-        for row in range(1, len(lines)):
-            parts = lines[row].split(",")
-            for place, every in places.items():
-                if (row - 1) % every:
-                    parts[place] = ""
-            lines[row] = ",".join(parts)
+    def edit(row: int, parts: list[str]) -> None:
+        for place, every in places.items():
+            parts[place] = "" if row % every else parts[place]
 
-    return changed(edit)
+    return changed(each_row(edit))
 
 
 def on_change() -> str:
-    def edit(lines: list[str]) -> None:
-        before = ""
-        for row in range(1, len(lines)):
-            parts = lines[row].split(",")
-            before, parts[1] = parts[1], "" if parts[1] == before else parts[1]
-            lines[row] = ",".join(parts)
+    def edit(row: int, parts: list[str]) -> None:
+        parts[1] = "" if row and DATA[row, 1] == DATA[row - 1, 1] else parts[1]
 
-    return changed(edit)
+    return changed(each_row(edit))
 
 
 def interleaved() -> str:
@@ -143,10 +135,11 @@ def restarted(first: int, clock: Callable[[int], str] = plain, head: bool = Fals
 def turned(low: float) -> str:
     """An encoder that starts again after a full turn, on an axis that is off by 330 or 150."""
     off = -30.0 if low == 0.0 else 150.0
-    lines = [",".join(["time [s]", *HEAD])]
-    for i, (_, u, p, a) in enumerate(DATA.tolist()):
-        lines.append(f"{plain(i)},{u:g},{p:.4f},{(a + off - low) % 360.0 + low:.3f}")
-    return "\n".join(lines)
+
+    def edit(row: int, parts: list[str]) -> None:
+        parts[3] = f"{(DATA[row, 3] + off - low) % 360.0 + low:.3f}"
+
+    return changed(each_row(edit))
 
 
 def packets() -> str:
@@ -181,7 +174,6 @@ def stamped(scale: int) -> Callable[[int], str]:
     return lambda i: str(EPOCH * scale + i * scale // 50)
 
 
-DE = table("Zeitstempel", date("%d.%m.%Y %H:%M:%S,%f"), ";")
 CLOCKS = {
     "seconds": Case(table("time [s]", plain)),
     "milliseconds": Case(table("time (ms)", lambda i: f"{20 * i}")),
@@ -211,16 +203,13 @@ CLOCKS = {
         ("seconds and millis are one clock",),
     ),
     "dates and milliseconds": Case(
-        table(
-            "Zeitstempel,ms",
-            date("%d.%m.%Y %H:%M:%S,%f"),
-        ),
+        table("Zeitstempel,ms", date("%d.%m.%Y %H:%M:%S,%f")),
         ("Zeitstempel and ms are one clock, here Zeitstempel",),
     ),
     "dates beside a finer clock": Case(
         table("Timestamp,Elapsed ms", lambda i: f"{date('%m/%d/%Y %I:%M:%S %p')(i)},{20 * i}")
     ),
-    "German dates": Case(DE),
+    "German dates": Case(table("Zeitstempel", date("%d.%m.%Y %H:%M:%S,%f"), ";")),
     "ISO": Case(table("when", date("%Y-%m-%dT%H:%M:%S.%fZ"))),
     "ISO with a zone": Case(table("datetime", date("%Y-%m-%d %H:%M:%S.%f+01:00", digits=6))),
     "American dates": Case(table("Moment", date("%m/%d/%Y %I:%M:%S.%f %p"))),
@@ -262,7 +251,7 @@ CLOCKS = {
         ("a clock of 32 bits: 1",),
     ),
     "whole seconds": Case(
-        table("when", lambda i: date("%d.%m.%Y %H:%M:%S")(i)),
+        table("when", date("%d.%m.%Y %H:%M:%S")),
         ("200 rows have 5 different times (up to 50 rows of one)",),
     ),
     "whole milliseconds of 200 in a packet": Case(
@@ -272,11 +261,11 @@ CLOCKS = {
 }
 CELLS = {
     "bad cells": Case(
-        changed(all_of(cells(41, 2, "OL"), cells(43, 3, "#N/A"), cells(60, 2, "1.#INF"))),
+        changed(cells(41, 2, "OL"), cells(43, 3, "#N/A"), cells(60, 2, "1.#INF")),
         ("2 cells are no numbers ('OL', '1.#INF')", "1 cell is no number ('#N/A')"),
         lost=3,
     ),
-    "NaN": Case(changed(all_of(cells(41, 2, "NaN"), cells(43, 3, "--"))), lost=2),
+    "NaN": Case(changed(cells(41, 2, "NaN"), cells(43, 3, "--"), cells(45, 3, "")), lost=3),
     "a bad time": Case(changed(cells(41, 0, "0.7.8")), ("rows without a time: 1",), lost=1),
     "a line cut short": Case(
         changed(lambda lines: lines.__setitem__(-1, lines[-1][:7])),
@@ -291,7 +280,7 @@ CELLS = {
     "swapped rows": Case(changed(swap), ("rows that come after later ones",)),
     "newest first": Case(changed(newest_first), ("the newest row comes first",)),
     "newest first, swapped rows": Case(
-        changed(all_of(newest_first, swap)),
+        changed(newest_first, swap),
         ("the newest row comes first", "rows that come after later ones"),
     ),
     "newest first, whole seconds of a date": Case(
@@ -367,22 +356,19 @@ TABLE = {
 }
 
 
-def imported(folder: Path, text: str, **form: Any) -> tuple[list[Recording], str]:
+def imported(folder: Path, log: bytes) -> tuple[list[Recording], str]:
     """The recordings of a log by the case that is proposed for it, and what is told."""
-    log = folder / "log.csv"
-    log.write_text(text, encoding="utf-8")
-    rig = pamrs.rigs.shoulder()
-    proposal = propose([log], rig, form=TextFormat(**form) if form else None)
-    rig.to_toml(folder / "rig.toml")
-    (folder / "case.toml").write_text(proposal.case_toml(folder), encoding="utf-8")
+    (folder / "log.csv").write_bytes(log)
+    proposal = propose([folder / "log.csv"], SHOULDER)
     (item,) = proposal.logs
-    return load_case(folder).recordings, "\n".join([*item.log.remarks, *item.remarks])
+    told = "\n".join([*item.log.remarks, *item.remarks])
+    return case_of(folder, proposal).recordings, told
 
 
 @pytest.mark.parametrize("name", TABLE)
 def test_a_log_is_read_right_and_what_was_done_is_told(tmp_path: Path, name: str) -> None:
     case = TABLE[name]
-    recordings, told = imported(tmp_path, case.text)
+    recordings, told = imported(tmp_path, case.text.encode())
     assert all(words in told for words in case.told), told
     issues = "\n".join(issue.text for issue in recordings[0].issues)
     by_import = ("taken", "by name", "parts have")  # which case.toml says from then on
@@ -496,19 +482,17 @@ def test_parts_keep_their_numbers_where_a_shorter_one_is_left_out(tmp_path: Path
 
 
 def test_a_slower_channel_is_cut_with_the_rows_of_its_log(tmp_path: Path) -> None:
-    lines = thin({2: 5, 1: 5}).splitlines()
-    text = "\n".join([*lines, *lines[1:]])
-    for split in ("clock", {"gap": 1.0}, {"column": "part"}):
-        log = "\n".join([*lines, *lines]) if split == {"column": "part"} else text
-        if split == {"gap": 1.0}:
-            late = [
-                f"{float(line.split(',', 1)[0]) + 60:.2f},{line.split(',', 1)[1]}"
-                for line in lines[1:]
-            ]
-            log = "\n".join([*lines, *late])
-        first, second = loaded(tmp_path, log, split=split)
-        for each in (first, second):
-            check(each, Case(log, near=0.2), 0)
+    head, *lines = thin({2: 5, 1: 5}).splitlines()
+    late = [f"{float(time) + 60:.2f},{rest}" for time, rest in (x.split(",", 1) for x in lines)]
+    for split, second in (
+        ("clock", lines),
+        ({"gap": 1.0}, late),
+        ({"column": "part"}, [head, *lines]),
+    ):
+        parts = loaded(tmp_path, "\n".join([head, *lines, *second]), split=split)
+        assert len(parts) == 2
+        for each in parts:
+            check(each, Case("", near=0.2), 0)
 
 
 def test_a_unit_that_the_size_of_the_stamps_contradicts_is_refused(tmp_path: Path) -> None:
@@ -532,21 +516,12 @@ def test_recordings_of_one_encoder_lie_on_one_turn(tmp_path: Path) -> None:
     """An encoder of several turns that was switched on a turn later: the joint of the rig goes from
     15 to 120 deg.
     """
-    rig = pamrs.rigs.shoulder()
-    rig.to_toml(tmp_path / "rig.toml")
-    entries = []
-    for name, angle in (("a", DATA[:, 3]), ("b", np.full(N, 22.0) + 0.01 * (np.arange(N) % 3))):
-        lines = table("time [s]", plain).splitlines()
-        raw = angle + 360.0 * (name == "b")
-        for row in range(N):
-            parts = lines[row + 1].split(",")
-            lines[row + 1] = ",".join([*parts[:3], f"{raw[row]:.3f}"])
-        (tmp_path / f"{name}.csv").write_text("\n".join([KNOWN, *lines[1:]]), encoding="utf-8")
-        entries.append(f'[[recording]]\nfile = "{name}.csv"\n')
-    (tmp_path / "case.toml").write_text(
-        'schema = "pamrs.case/1"\n' + "".join(entries), encoding="utf-8"
-    )
-    first, second = load_case(tmp_path).recordings
+    toml = 'schema = "pamrs.case/1"\n'
+    for name, angle in (("a", DATA[:, 3]), ("b", np.full(N, 382.0) + 0.01 * (np.arange(N) % 3))):
+        lines = rows(plain, data=np.column_stack([DATA[:, :3], angle]))
+        (tmp_path / f"{name}.csv").write_text("\n".join([KNOWN, *lines]), encoding="utf-8")
+        toml += f'[[recording]]\nfile = "{name}.csv"\n'
+    first, second = case_of(tmp_path, toml).recordings
     assert [issue.kind for issue in first.issues] == []
     assert second.issues[0].text == "-1 turns, which puts it between the ends in the rig file"
     np.testing.assert_allclose(np.degrees(second.channels["joint_angle"]), 22.0, atol=0.03)
@@ -568,13 +543,10 @@ def test_a_clock_that_is_coarser_than_the_samples_gives_their_rate(tmp_path: Pat
 
 
 def test_a_dropout_of_an_encoder_is_no_turn(tmp_path: Path) -> None:
-    def edit(lines: list[str]) -> None:
-        for row in range(1, N + 1):
-            parts = lines[row].split(",")
-            parts[3] = "0.000" if row == 90 else f"{float(parts[3]) + 280:.3f}"
-            lines[row] = ",".join(parts)
+    def edit(row: int, parts: list[str]) -> None:
+        parts[3] = "0.000" if row == 89 else f"{DATA[row, 3] + 280:.3f}"
 
-    (read,) = loaded(tmp_path, changed(edit))
+    (read,) = loaded(tmp_path, changed(each_row(edit)))
     assert [issue.kind for issue in read.issues] == ["outlier"]
     assert np.nanmin(read.channels["joint_angle"]) > np.radians(299.0)
 
@@ -601,15 +573,10 @@ def test_arrival_is_a_clock_to_choose(tmp_path: Path) -> None:
 
 def write_stamped(path: Path, sent: Array, late: Array, epoch: int = EPOCH) -> None:
     """Messages in JSON with a header, as bridges of ROS write them."""
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        schema = writer.register_schema("State", "jsonschema", b"{}")
-        channel = writer.register_channel("/rig", "json", schema)
-        for row, (at, delay) in enumerate(zip(sent, late, strict=True)):
-            nanos = round(at * 1e9)
-            stamp = {"sec": epoch + nanos // 10**9, "nanosec": nanos % 10**9}
-            body = json.dumps({"header": {"stamp": stamp}, "p1": float(row)}).encode()
-            arrived = EPOCH * 10**9 + nanos + round(delay * 1e9)
-            writer.add_message(channel, arrived, body, arrived)
-        writer.finish()
+    sends = []
+    for row, (at, delay) in enumerate(zip(sent, late, strict=True)):
+        nanos = round(at * 1e9)
+        stamp = {"sec": epoch + nanos // 10**9, "nanosec": nanos % 10**9}
+        arrived = EPOCH * 10**9 + nanos + round(delay * 1e9)
+        sends.append((arrived, arrived, {"header": {"stamp": stamp}, "p1": float(row)}))
+    write_json_messages(path, "/rig", sends)

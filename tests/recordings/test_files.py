@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,17 @@ from pamrs.errors import CaseError, RecordingError, RigError
 from pamrs.recordings import _gate, load_case, load_recording
 from pamrs.recordings.logs import read_log
 from pamrs.recordings.logs._hdf import leads_elsewhere
-from tests.recordings.written import N, mapping, written
+from tests.recordings.written import SHOULDER, N, mapping, written
 
 HEADER = "time [s],force [N]\n"
+SEALED = pamrs.rigs.sealed_chamber()
+
+
+@pytest.fixture
+def stand(tmp_path: Path) -> Path:
+    """An empty folder of a case."""
+    (tmp_path / "stand").mkdir()
+    return tmp_path / "stand"
 
 
 def special(folder: Path, ending: str) -> tuple[Path, Path]:
@@ -33,18 +42,14 @@ def special(folder: Path, ending: str) -> tuple[Path, Path]:
     return device, pipe
 
 
-@pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".parquet"])
-def test_devices_and_pipes_are_refused_at_once(tmp_path: Path, ending: str) -> None:
+@pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".parquet", ".npz", ".mat", ".mf4"])
+@pytest.mark.parametrize("load", [load_recording, read_log])
+def test_devices_and_pipes_are_refused_at_once(
+    tmp_path: Path, load: Callable[[Path], object], ending: str
+) -> None:
     for path in special(tmp_path, ending):
         with pytest.raises(RecordingError, match=rf"{path.name}: .* (regular file|pyarrow)"):
-            load_recording(path)
-
-
-@pytest.mark.parametrize("ending", [".csv", ".txt.gz", ".npz", ".mat", ".mf4"])
-def test_logs_are_regular_files_too(tmp_path: Path, ending: str) -> None:
-    for path in special(tmp_path, ending):
-        with pytest.raises(RecordingError, match=rf"{path.name}: .* regular file"):
-            read_log(path)
+            load(path)
 
 
 def test_logs_have_the_limits_of_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,76 +117,55 @@ def test_depth_is_limited(tmp_path: Path, text: str) -> None:
         pamrs.load_rig(tmp_path)
 
 
-def test_what_lies_outside_is_not_opened(tmp_path: Path) -> None:
-    home = tmp_path / "stand"
-    home.mkdir()
-    pamrs.rigs.sealed_chamber().to_toml(tmp_path / "rig.toml")
-    (home / "link.csv").symlink_to("/dev/zero")
-    (home / "case.toml").write_text(
+def test_what_lies_outside_is_not_opened(stand: Path) -> None:
+    SEALED.to_toml(stand.parent / "rig.toml")
+    (stand / "link.csv").symlink_to("/dev/zero")
+    (stand / "case.toml").write_text(
         'schema = "pamrs.case/1"\nrig = "../rig.toml"\n[[recording]]\nfile = "link.csv"\n'
     )
     with pytest.raises(CaseError) as caught:
-        load_case(home)
-    message = str(caught.value)
-    assert "rig = '../rig.toml': lies outside the case folder" in message
-    assert "recording[0].file = 'link.csv': lies outside the case folder" in message
+        load_case(stand)
+    for named in ("rig = '../rig.toml'", "recording[0].file = 'link.csv'"):
+        assert f"{named}: lies outside the case folder" in str(caught.value)
     with pytest.raises(CaseError, match="it is a device"):
-        load_case(home, allow_outside=True)
-
-
-def outside_rig(home: Path) -> Path:
-    """A rig beside a case folder."""
-    pamrs.rigs.sealed_chamber().to_toml(home.parent / "secret.toml")
-    return home.parent / "secret.toml"
+        load_case(stand, allow_outside=True)
 
 
 RECORDING = '[[recording]]\nfile = "run.csv"\n'
 
 
 @pytest.mark.parametrize("named", ["", 'rig = "rig.toml"\n', 'rig = "."\n', 'rig = "bench"\n'])
-def test_a_rig_file_that_is_a_link_out_of_the_folder_is_not_opened(
-    tmp_path: Path, named: str
-) -> None:
+def test_a_rig_file_that_is_a_link_out_of_the_folder_is_not_opened(stand: Path, named: str) -> None:
     """Also where it is not named, and in a folder that is."""
-    home = tmp_path / "stand"
-    (home / "bench").mkdir(parents=True)
-    (home / "case.toml").write_text(f'schema = "pamrs.case/1"\n{named}{RECORDING}')
-    (home / "run.csv").write_text(
-        "time [s],muscle_pressure [Pa]\n" + "".join(f"{k},{1e5 + k}\n" for k in range(40))
-    )
-    there = home / ("bench/rig.toml" if "bench" in named else "rig.toml")
-    there.symlink_to(outside_rig(home))
+    (stand / "bench").mkdir()
+    (stand / "case.toml").write_text(f'schema = "pamrs.case/1"\n{named}{RECORDING}')
+    rows = "".join(f"{k},{1e5 + k}\n" for k in range(40))
+    (stand / "run.csv").write_text(f"time [s],muscle_pressure [Pa]\n{rows}")
+    there = stand / ("bench/rig.toml" if "bench" in named else "rig.toml")
+    there.symlink_to(SEALED.to_toml(stand.parent / "secret.toml"))
     with pytest.raises(CaseError, match=r"rig = .*: .*lies outside the case folder"):
-        load_case(home)
-    assert load_case(home, allow_outside=True).rig.name == "sealed_chamber"
+        load_case(stand)
+    assert load_case(stand, allow_outside=True).rig.name == "sealed_chamber"
     there.unlink()
-    pamrs.rigs.sealed_chamber().to_toml(there)
-    assert load_case(home).rig.name == "sealed_chamber"
+    SEALED.to_toml(there)
+    assert load_case(stand).rig.name == "sealed_chamber"
 
 
-def test_a_description_that_is_a_link_out_of_its_folder_is_not_opened(tmp_path: Path) -> None:
-    home = tmp_path / "stand"
-    home.mkdir()
-    outside_rig(home)
-    (home / "case.toml").symlink_to(tmp_path / "secret.toml")
+def test_a_description_that_is_a_link_out_of_its_folder_is_not_opened(stand: Path) -> None:
+    (stand / "case.toml").symlink_to(SEALED.to_toml(stand.parent / "secret.toml"))
     with pytest.raises(CaseError, match=r"case.toml: lies outside the case folder"):
-        load_case(home)
+        load_case(stand)
     with pytest.raises(CaseError, match=r"'pamrs.rig/1' is not allowed"):  # opened on request
-        load_case(home, allow_outside=True)
+        load_case(stand, allow_outside=True)
 
 
-def test_a_link_in_the_folder_of_a_bag_is_not_opened(tmp_path: Path) -> None:
-    home = tmp_path / "stand"
-    (home / "bag").mkdir(parents=True)
-    pamrs.rigs.sealed_chamber().to_toml(home / "rig.toml")
-    (home / "bag" / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
-    (home / "bag" / "bag_0.db3").symlink_to(tmp_path / "other.db3")
-    (home / "case.toml").write_text(
-        'schema = "pamrs.case/1"\n[[recording]]\nfile = "bag"\n[recording.channels]\n'
-        'muscle_pressure = { column = "p", unit = "bar" }\n'
-    )
+def test_a_link_in_the_folder_of_a_bag_is_not_opened(stand: Path) -> None:
+    (stand / "bag").mkdir()
+    (stand / "bag" / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
+    (stand / "bag" / "bag_0.db3").symlink_to(stand.parent / "other.db3")
+    case_of_a_bag(stand, "bag")
     with pytest.raises(CaseError, match=r"file = 'bag': .*bag_0.db3 lies outside the case folder"):
-        load_case(home)
+        load_case(stand)
 
 
 MAPPED = "".join(
@@ -192,38 +176,37 @@ MAPPED = "".join(
 
 def case_of_a_bag(home: Path, bag: str) -> None:
     """A case of one bag, which was written with :func:`written`."""
-    pamrs.rigs.shoulder().to_toml(home / "rig.toml")
+    SHOULDER.to_toml(home / "rig.toml")
     (home / "case.toml").write_text(
         f'schema = "pamrs.case/1"\n[[recording]]\nfile = "{bag}"\n[recording.channels]\n{MAPPED}'
     )
 
 
 @pytest.mark.parametrize("whole", [True, False])
-def test_a_bag_whose_names_sqlite_decodes_is_not_opened(tmp_path: Path, whole: bool) -> None:
+def test_a_bag_whose_names_sqlite_decodes_is_not_opened(
+    tmp_path: Path, stand: Path, whole: bool
+) -> None:
     """A file of that very name lies in the case folder, empty: what is read is another one."""
     pytest.importorskip("rosbags")
     bag, _, _ = written(tmp_path, "bag")
     (stored,) = bag.glob("*.db3")
     secret = stored.rename(tmp_path / "secret.db3")
-    home = tmp_path / "stand"
-    (home / "bag").mkdir(parents=True)
+    (stand / "bag").mkdir()
+    name = "bag/..%2f..%2fsecret.db3" if whole else "..%2fsecret.db3"
+    told = (bag / "metadata.yaml").read_text()
+    assert stored.name in told
     if whole:
-        name = "bag/..%2f..%2fsecret.db3"
-        told = (bag / "metadata.yaml").read_text()
-        assert stored.name in told
-        told = told.replace(stored.name, Path(name).name)
-        (home / "bag" / "metadata.yaml").write_text(told)
-    else:
-        name = "..%2fsecret.db3"
-    (home / name).touch()
-    case_of_a_bag(home, "bag" if whole else name)
+        other = told.replace(stored.name, Path(name).name)
+        (stand / "bag" / "metadata.yaml").write_text(other)
+    (stand / name).touch()
+    case_of_a_bag(stand, "bag" if whole else name)
     with pytest.raises(CaseError, match=r"names with %, \? or # are not read from bags"):
-        load_case(home)
-    (home / name).unlink()
-    shutil.copy(secret, home / "bag" / stored.name)
-    (home / "bag" / "metadata.yaml").write_text((bag / "metadata.yaml").read_text())
-    case_of_a_bag(home, "bag")
-    assert len(load_case(home).recordings[0]) == N
+        load_case(stand)
+    (stand / name).unlink()
+    shutil.copy(secret, stand / "bag" / stored.name)
+    (stand / "bag" / "metadata.yaml").write_text(told)
+    case_of_a_bag(stand, "bag")
+    assert len(load_case(stand).recordings[0]) == N
 
 
 @pytest.mark.parametrize("mark", ["%", "?", "#"])
@@ -237,22 +220,33 @@ def test_a_folder_above_a_bag_leads_nowhere_else(tmp_path: Path, mark: str) -> N
         read_log(home / "bag")
 
 
-def test_numbers_that_lie_in_another_file_are_not_read(tmp_path: Path) -> None:
-    """An HDF5 file can lead to any other: by raw storage, by virtual data sets, by links."""
+SECRET = np.arange(40.0)
+
+
+def leading(group: Any, home: Path) -> Any:
+    """Ways by which an HDF5 file leads to any other: raw storage, virtual data sets, links."""
     h5py = pytest.importorskip("h5py")
-    secret = np.arange(40.0)
-    secret.tofile(tmp_path / "secret.bin")
-    with h5py.File(tmp_path / "secret.h5", "w") as file:
-        file["p"] = secret
+    SECRET.tofile(home / "secret.bin")
+    with h5py.File(home / "secret.h5", "w") as file:
+        file["p"] = SECRET
+    stored = [(str(home / "secret.bin"), 0, SECRET.nbytes)]
+    layout = h5py.VirtualLayout(SECRET.shape, "f8")
+    layout[:] = h5py.VirtualSource(str(home / "secret.h5"), "p", SECRET.shape)
+    link = h5py.ExternalLink(str(home / "secret.h5"), "p")
+    return {
+        "raw": lambda: group.create_dataset("raw", SECRET.shape, "f8", external=stored),
+        "virtual": lambda: group.create_virtual_dataset("virtual", layout),
+        "link": lambda: group.__setitem__("link", link),
+    }
+
+
+def test_numbers_that_lie_in_another_file_are_not_read(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "run.h5", "w") as file:
-        file["own"] = secret + 1.0
-        stored = [(str(tmp_path / "secret.bin"), 0, secret.nbytes)]
-        file.create_dataset("raw", secret.shape, "f8", external=stored)
-        layout = h5py.VirtualLayout(secret.shape, "f8")
-        layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "p", secret.shape)
-        file.create_virtual_dataset("virtual", layout)
-        for name in ("link", "daq/link"):
-            file[name] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "p")
+        file["own"] = SECRET + 1.0
+        for lead in leading(file, tmp_path).values():
+            lead()
+        leading(file.create_group("daq"), tmp_path)["link"]()
         assert file["raw"][3] == file["virtual"][3] == file["link"][3] == 3.0  # they do lead there
     log = read_log(tmp_path / "run.h5")
     assert list(log.series) == ["own"]
@@ -315,19 +309,10 @@ def test_groups_with_many_names_are_looked_at_once(tmp_path: Path) -> None:
 def test_a_matlab_file_that_leads_to_another_is_refused(tmp_path: Path, how: str) -> None:
     h5py = pytest.importorskip("h5py")
     pytest.importorskip("matio")
-    secret = np.arange(40.0)
-    secret.tofile(tmp_path / "secret.bin")
     with h5py.File(tmp_path / "run.mat", "w", userblock_size=512) as file:
         group = file.create_group("daq")
+        leading(group, tmp_path)[how]()
         if how == "raw":
-            stored = [(str(tmp_path / "secret.bin"), 0, secret.nbytes)]
-            made = group.create_dataset("p", secret.shape, "f8", external=stored)
-            made.attrs["MATLAB_class"] = np.bytes_("double")
-        elif how == "virtual":
-            layout = h5py.VirtualLayout(secret.shape, "f8")
-            layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "p", secret.shape)
-            group.create_virtual_dataset("p", layout)
-        else:
-            group["p"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "p")
-    with pytest.raises(RecordingError, match=r"run.mat: .*p: .* into this (file|one)"):
+            group["raw"].attrs["MATLAB_class"] = np.bytes_("double")
+    with pytest.raises(RecordingError, match=rf"run.mat: .*{how}: .* into this (file|one)"):
         read_log(tmp_path / "run.mat")

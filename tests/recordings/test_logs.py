@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import struct
+import warnings
 import zipfile
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -15,37 +16,51 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pamrs.errors import MissingPackageError, RecordingError
-from pamrs.recordings import load_recording, load_recordings
+from pamrs.recordings import load_recording, load_recordings, propose
 from pamrs.recordings import logs as logs_package
 from pamrs.recordings.logs import TextFormat, _sheets, read_log
-from tests.recordings.written import CHANNELS, DT, FORMATS, UNITS, N, mapping, signals, written
+from tests.recordings.written import (
+    CHANNELS,
+    DT,
+    FORMATS,
+    SHOULDER,
+    UNITS,
+    N,
+    case_of,
+    mapping,
+    signals,
+    written,
+)
 
 
 @pytest.mark.parametrize("kind", FORMATS)
-def test_the_same_log_gives_the_same_recording(tmp_path: Path, kind: str) -> None:
+def test_the_same_log_gives_the_same_recording_and_is_proposed(tmp_path: Path, kind: str) -> None:
     data = signals()
     file, pattern, time = written(tmp_path, kind)
-    (got,) = load_recordings(file, channels=mapping(pattern), time=time)
-    plain = tmp_path / "plain.csv"
-    head = "time [s],valve_command [V],muscle_pressure [bar],joint_angle [deg]"
-    np.savetxt(plain, np.column_stack(list(data.values())), "%.6f", ",", header=head, comments="")
-    wanted = load_recording(plain)
-    assert got.sample_time == wanted.sample_time == DT
-    assert len(got) == len(wanted) == N
-    assert got.units == wanted.units
-    for channel in CHANNELS:
-        np.testing.assert_array_equal(got.mask[channel], wanted.mask[channel])
-        np.testing.assert_allclose(got.channels[channel], wanted.channels[channel], rtol=1e-12)
-
-
-@pytest.mark.parametrize("kind", FORMATS)
-def test_names_and_units_are_listed(tmp_path: Path, kind: str) -> None:
-    file, pattern, _ = written(tmp_path, kind)
     log = read_log(file)
     for name, unit in UNITS.items():
         series = log.find(pattern.format(name))
         assert len(series.values) == N
         assert series.unit in ("", unit, "°" if unit == "deg" else unit)
+    head = "time [s],valve_command [V],muscle_pressure [bar],joint_angle [deg]"
+    table = np.column_stack(list(data.values()))
+    np.savetxt(tmp_path / "plain.csv", table, "%.6f", ",", header=head, comments="")
+    wanted = load_recording(tmp_path / "plain.csv")
+    proposal = propose([file], SHOULDER)
+    (item,) = proposal.logs
+    assert {match.channel: match.series.name for match in item.matches} == {
+        channel: pattern.format(name) for channel, name in CHANNELS.items()
+    }
+    (mapped,) = load_recordings(file, channels=mapping(pattern), time=time)
+    (proposed,) = case_of(tmp_path, proposal).recordings
+    for got in (mapped, proposed):
+        assert got.name == file.name.partition(".")[0]
+        assert got.sample_time == wanted.sample_time == DT
+        assert len(got) == len(wanted) == N
+        assert got.units == wanted.units
+        for channel in CHANNELS:
+            np.testing.assert_array_equal(got.mask[channel], wanted.mask[channel])
+            np.testing.assert_allclose(got.channels[channel], wanted.channels[channel], rtol=1e-12)
 
 
 def text_log(tmp_path: Path, text: str, **form: Any) -> Any:
@@ -77,8 +92,8 @@ def test_dates_times_of_day_texts_and_thousands(tmp_path: Path) -> None:
     assert log.series["load"].unit == "N"
     assert log.series["load"].values[3] == 1003.5
     night = "".join(f"{23 if i < 9 else 0}:{(51 + i) % 60:02d}:00,{i}\n" for i in range(20))
-    log = text_log(tmp_path, "clock,p\n" + night)
-    np.testing.assert_allclose(log.series["clock"].values, 60.0 * np.arange(20))
+    clock = text_log(tmp_path, "clock,p\n" + night).series["clock"]
+    np.testing.assert_allclose(clock.values, 60.0 * np.arange(20))
 
 
 def test_a_cell_that_is_no_number_is_a_missing_sample_and_told(tmp_path: Path) -> None:
@@ -96,10 +111,7 @@ def test_names_that_are_not_there(tmp_path: Path) -> None:
         log.find("daq/p2")
 
 
-@pytest.mark.parametrize(
-    "ending",
-    ["mat", "h5", "mf4", "tdms", "db3", "mcap", "parquet", "npz", "feather", "xlsx", "xls"],
-)
+@pytest.mark.parametrize("ending", ["mat", "mf4", "db3", "parquet", "feather"])
 def test_broken_files_are_named(tmp_path: Path, ending: str) -> None:
     file = tmp_path / f"broken.{ending}"
     file.write_bytes(b"\x00\x01 this is none of these formats " * 20)
@@ -109,9 +121,7 @@ def test_broken_files_are_named(tmp_path: Path, ending: str) -> None:
 
 @pytest.mark.parametrize(("name", "words"), [("a.docx", "'.docx'"), (".", "a folder"), ("b", "no")])
 def test_what_is_not_read(tmp_path: Path, name: str, words: str) -> None:
-    if name != "b":
-        file = tmp_path / name
-        file.exists() or file.write_text("x")
+    (tmp_path / "a.docx").write_text("x")
     with pytest.raises(RecordingError, match=words):
         read_log(tmp_path / name)
 
@@ -154,12 +164,8 @@ def test_several_groups_of_an_mdf_have_their_clocks_and_invalid_samples(tmp_path
     bad[3] = True
     with MDF() as file:
         file.append([Signal(np.arange(100.0), np.arange(100) * 0.1, name="p1", unit="bar")])
-        file.append(
-            [
-                Signal(20.0 + slow, slow, name="T", unit="degC", invalidation_bits=bad),
-                Signal(slow, slow, name="p1", unit="bar"),
-            ]
-        )
+        warm = Signal(20.0 + slow, slow, name="T", unit="degC", invalidation_bits=bad)
+        file.append([warm, Signal(slow, slow, name="p1", unit="bar")])
         file.save(tmp_path / "run.mf4", overwrite=True)
     log = read_log(tmp_path / "run.mf4")
     assert [name.split("/")[-1] for name in log.series] == ["p1", "T", "p1"]
@@ -177,72 +183,64 @@ def test_topics_at_their_own_rates_and_stamps_of_their_own(tmp_path: Path) -> No
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    number = store.types["std_msgs/msg/Float64"]
-    text = store.types["std_msgs/msg/String"]
-    wrench = store.types["geometry_msgs/msg/WrenchStamped"]
-    header = store.types["std_msgs/msg/Header"]
-    stamp = store.types["builtin_interfaces/msg/Time"]
-    vector = store.types["geometry_msgs/msg/Vector3"]
+    kinds = store.types
+    number, text = kinds["std_msgs/msg/Float64"], kinds["std_msgs/msg/String"]
+    wrench, vector = kinds["geometry_msgs/msg/WrenchStamped"], kinds["geometry_msgs/msg/Vector3"]
+    header, stamp = kinds["std_msgs/msg/Header"], kinds["builtin_interfaces/msg/Time"]
     with Writer(tmp_path / "bag", version=9) as writer:
         made = {
-            topic: writer.add_connection(topic, kind.__msgtype__, typestore=store)
+            kind: writer.add_connection(topic, kind.__msgtype__, typestore=store)
             for topic, kind in (("/p", number), ("/note", text), ("/cell", wrench))
         }
+
+        def write(now: int, message: Any) -> None:
+            raw = store.serialize_cdr(message, message.__msgtype__)
+            writer.write(made[type(message)], now, raw)
+
         for step in range(100):
             now = 10**18 + step * 10**7
-            writer.write(made["/p"], now, store.serialize_cdr(number(2.0), number.__msgtype__))
+            write(now, number(2.0))
             if step % 5 == 0:
                 sent = now - (2 + 12 * (step % 2)) * 10**6
-                message = wrench(
-                    header(stamp(sent // 10**9, sent % 10**9), "cell"),
-                    store.types["geometry_msgs/msg/Wrench"](
-                        vector(0.0, 0.0, float(step)), vector(0.0, 0.0, 0.0)
-                    ),
-                )
-                raw = store.serialize_cdr(message, wrench.__msgtype__)
-                writer.write(made["/cell"], now, raw)
-        raw = store.serialize_cdr(text("start"), text.__msgtype__)
-        writer.write(made["/note"], 10**18, raw)
+                head = header(stamp(sent // 10**9, sent % 10**9), "cell")
+                pull, none = vector(0.0, 0.0, float(step)), vector(0.0, 0.0, 0.0)
+                write(now, wrench(head, kinds["geometry_msgs/msg/Wrench"](pull, none)))
+        write(10**18, text("start"))
     for path in (tmp_path / "bag", tmp_path / "bag" / "bag.db3"):
         log = read_log(path)
         force = log.find("/cell/wrench/force/z")
         assert force.time is not None
-        late = 2e-3 + 12e-3 * (np.arange(20) % 2)
-        sent = 0.05 * np.arange(20) - late
+        sent = 0.05 * np.arange(20) - 2e-3 - 12e-3 * (np.arange(20) % 2)
         np.testing.assert_allclose(force.time, sent - sent[0], atol=1e-12)
         np.testing.assert_allclose(force.values, 5.0 * np.arange(20))
-        np.testing.assert_allclose(
-            log.find("/cell/header/stamp").values, 1e9 + sent, rtol=0, atol=3e-7
-        )
-        np.testing.assert_allclose(
-            log.find("/cell/arrival").values, 0.05 * np.arange(20) + 2e-3, atol=1e-12
-        )
+        stamps = log.find("/cell/header/stamp").values
+        np.testing.assert_allclose(stamps, 1e9 + sent, rtol=0, atol=3e-7)
+        arrival = log.find("/cell/arrival").values
+        np.testing.assert_allclose(arrival, 0.05 * np.arange(20) + 2e-3, atol=1e-12)
         assert "/cell: times are the stamps of its messages" in log.remarks[0]
         assert "arrived 8 ms later in the middle (2 to 14 ms)" in log.remarks[0]
         assert log.remarks[1:] == ["/p: no stamps, times are those of arrival"]
         assert len(log.find("/p/data").values) == 100
 
 
-def test_signals_that_simulink_logs_in_a_dataset(tmp_path: Path) -> None:
-    import warnings
-
+def save_to_mat(path: Path, content: dict[str, Any]) -> None:
+    """By mat-io, whose import sets an option that pandas no longer needs."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         from matio import save_to_mat
-        from matio.utils.matclass import MatlabOpaque
+    save_to_mat(str(path), content)
+
+
+def test_signals_that_simulink_logs_in_a_dataset(tmp_path: Path) -> None:
+    opaque = pytest.importorskip("matio.utils.matclass").MatlabOpaque
     time = np.arange(30.0)[:, None] * 0.1
     elements = np.empty((1, 2), dtype=object)
     for place, name in enumerate(("p1", "angle")):
-        values = MatlabOpaque(
-            {"Data_": (place + 1.0) * time, "Time_": time, "Name": np.array([name])},
-            "timeseries",
-            "MCOS",
-        )
-        elements[0, place] = MatlabOpaque(
-            {"Name": np.array([name]), "Values": values}, "Simulink.SimulationData.Signal", "MCOS"
-        )
-    dataset = MatlabOpaque({"Elements": elements}, "Simulink.SimulationData.Dataset", "MCOS")
-    save_to_mat(str(tmp_path / "run.mat"), {"logsout": dataset})
+        own = {"Data_": (place + 1.0) * time, "Time_": time, "Name": np.array([name])}
+        signal = {"Name": np.array([name]), "Values": opaque(own, "timeseries", "MCOS")}
+        elements[0, place] = opaque(signal, "Simulink.SimulationData.Signal", "MCOS")
+    dataset = opaque({"Elements": elements}, "Simulink.SimulationData.Dataset", "MCOS")
+    save_to_mat(tmp_path / "run.mat", {"logsout": dataset})
     log = read_log(tmp_path / "run.mat")
     assert list(log.series) == ["logsout/p1", "logsout/angle"]
     series = log.find("p1")
@@ -254,9 +252,8 @@ def test_tables_of_pandas_with_dates(tmp_path: Path) -> None:
     import pandas as pd
 
     when = pd.date_range("2024-05-12", periods=30, freq="20ms")
-    frame = pd.DataFrame(
-        {"when": when, "p1 [bar]": np.arange(30.0), "what": ["a"] * 10 + ["b"] * 20}
-    )
+    column = {"when": when, "p1 [bar]": np.arange(30.0), "what": ["a"] * 10 + ["b"] * 20}
+    frame = pd.DataFrame(column)
     for ending in ("parquet", "feather"):
         getattr(frame, f"to_{ending}")(tmp_path / f"run.{ending}")
         log = read_log(tmp_path / f"run.{ending}")
@@ -265,13 +262,6 @@ def test_tables_of_pandas_with_dates(tmp_path: Path) -> None:
         assert log.find("what").labels == ("a", "b")
         frame.set_index("when").to_parquet(tmp_path / "indexed.parquet")
     assert "when" in read_log(tmp_path / "indexed.parquet").series
-
-
-def test_utf_16_with_headings_that_say_it_all(tmp_path: Path) -> None:
-    rows = "".join(f"{0.1 * i:.1f},{i % 7}\n" for i in range(40))
-    file = tmp_path / "run.csv"
-    file.write_bytes(("time [s],muscle_pressure [bar]\n" + rows).encode("utf-16"))
-    assert len(load_recording(file)) == 40
 
 
 @settings(
@@ -292,17 +282,12 @@ def test_any_bytes_are_a_log_or_an_error_that_names_the_file(
 
 
 def test_tables_and_timetables_of_matlab(tmp_path: Path) -> None:
-    import warnings
-
     import pandas as pd
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        from matio import save_to_mat
     frame = pd.DataFrame({"p1": np.arange(30.0), "angle": np.arange(30.0)[::-1]})
     steps = np.arange(30).astype("timedelta64[s]")
     timed = frame.set_index(pd.TimedeltaIndex(steps))
-    save_to_mat(str(tmp_path / "run.mat"), {"lift": frame, "timed": timed})
+    save_to_mat(tmp_path / "run.mat", {"lift": frame, "timed": timed})
     log = read_log(tmp_path / "run.mat")
     np.testing.assert_array_equal(log.find("lift/p1").values, np.arange(30.0))
     time = log.find("timed/p1").time

@@ -10,39 +10,38 @@ import pytest
 
 import pamrs
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.recordings import load_case, propose, suspicions
+from pamrs.recordings import LogProposal, propose, suspicions
 from pamrs.recordings.logs import split_heading, understood_unit
-from tests.recordings.written import CHANNELS, DT, FORMATS, UNITS, N, signals, written
+from tests.recordings.written import (
+    DT,
+    SHOULDER,
+    UNITS,
+    N,
+    case_of,
+    npz,
+    signals,
+    write_table,
+    written,
+)
 from tests.tables import rows_of
 
 TIME = np.arange(4000) * 5e-3
 LIFT = np.sin(np.pi * TIME / TIME[-1]) ** 2
 
 
-@pytest.mark.parametrize("kind", FORMATS)
-def test_every_format_becomes_a_case(tmp_path: Path, kind: str) -> None:
-    file, pattern, _ = written(tmp_path, kind)
-    rig = pamrs.rigs.shoulder()
-    proposal = propose([file], rig)
-    (item,) = proposal.logs
-    assert {m.channel: m.series.name for m in item.matches} == {
-        channel: pattern.format(name) for channel, name in CHANNELS.items()
-    }
-    home = tmp_path / "case"
-    home.mkdir()
-    rig.to_toml(home / "rig.toml")
-    (home / "case.toml").write_text(proposal.case_toml(home), encoding="utf-8")
-    (only,) = load_case(home, allow_outside=True).recordings
-    assert (len(only), only.sample_time) == (N, DT)
-    np.testing.assert_allclose(
-        only.channels["muscle_pressure"], signals()["p1"] * 1e5, rtol=1e-9, atol=1e-4
-    )
-    np.testing.assert_allclose(only.channels["joint_angle"], np.radians(signals()["angle"]))
+def of_one(file: Path, rig: pamrs.Rig | None = SHOULDER, **options: Any) -> LogProposal:
+    """What is proposed for a log alone."""
+    (item,) = propose([file], rig, **options).logs
+    return item
+
+
+def channels_in(item: LogProposal) -> dict[str, str]:
+    return {match.channel: match.series.name for match in item.matches}
 
 
 def test_rates_units_and_ranges_are_listed(tmp_path: Path) -> None:
     file, _, _ = written(tmp_path, "mf4")
-    listed = {each.name: each for each in propose([file]).logs[0].listed}
+    listed = {each.name: each for each in of_one(file, None).listed}
     assert set(listed) == set(UNITS)
     p1 = listed["p1"]
     assert (p1.count, p1.unit, p1.channel) == (N, "bar", "muscle_pressure")
@@ -53,52 +52,43 @@ def test_rates_units_and_ranges_are_listed(tmp_path: Path) -> None:
 def test_named_blocks_several_clocks_events_and_parts(tmp_path: Path) -> None:
     rig = pamrs.rigs.antagonistic_joint()
     data = signals()
-    series = {
-        "t": np.concatenate([data["t"] + 20.0 * k for k in range(3)]),
-        "p_flexor [bar]": np.tile(data["p1"], 3),
-        "p_extensor [bar]": np.tile(4.0 - data["p1"], 3),
-        "hinge_angle [deg]": np.tile(data["angle"], 3),
-    }
-    np.savez(tmp_path / "run.npz", **series)
-    proposal = propose([tmp_path / "run.npz"], rig)
+    file = npz(
+        tmp_path,
+        t=np.concatenate([data["t"] + 20.0 * k for k in range(3)]),
+        **{"p_flexor [bar]": np.tile(data["p1"], 3)},
+        **{"p_extensor [bar]": np.tile(4.0 - data["p1"], 3)},
+        **{"hinge_angle [deg]": np.tile(data["angle"], 3)},
+    )
+    proposal = propose([file], rig)
     (item,) = proposal.logs
-    found = {match.channel: match.series.name for match in item.matches}
-    assert found["muscle_pressure.flexor"] == "p_flexor"
-    assert found["muscle_pressure.extensor"] == "p_extensor"
-    assert found["joint_angle.elbow"] == "hinge_angle"
+    assert channels_in(item) == {
+        "muscle_pressure.flexor": "p_flexor",
+        "muscle_pressure.extensor": "p_extensor",
+        "joint_angle.elbow": "hinge_angle",
+    }
     assert (item.split, len(item.pieces)) == ({"gap": 8.0}, 3)
     assert any("not found in this log: valve_command.flexor" in text for text in item.remarks)
-    rig.to_toml(tmp_path / "rig.toml")
-    (tmp_path / "case.toml").write_text(proposal.case_toml(tmp_path), encoding="utf-8")
-    case = load_case(tmp_path)
-    assert ([r.name for r in case.fit], [r.name for r in case.held_out]) == (
-        ["run_1", "run_2"],
-        ["run_3"],
-    )
+    case = case_of(tmp_path, proposal, rig)
+    assert [each.name for each in case.fit] == ["run_1", "run_2"]
+    assert [each.name for each in case.held_out] == ["run_3"]
 
 
 def test_several_logs_hold_out_the_last(tmp_path: Path) -> None:
-    files = []
-    for index in range(2):
-        home = tmp_path / str(index)
+    homes = [tmp_path / str(index) for index in range(2)]
+    for home in homes:
         home.mkdir()
-        files.append(written(home, "tdms", signals(index))[0])
-    text = propose(files, pamrs.rigs.shoulder()).case_toml(tmp_path)
+    files = [written(home, "tdms", signals(k))[0] for k, home in enumerate(homes)]
+    text = propose(files, SHOULDER).case_toml(tmp_path)
     assert text.count("[[recording]]") == 2
     assert text.index('role = "fit"') < text.index('role = "held_out"')
     assert 'file = "1/run.tdms"' in text
 
 
 def test_events_are_held_and_clocks_in_milliseconds_are_seen(tmp_path: Path) -> None:
-    changes = np.array([0.0, 3.0, 4.0, 11.0, 19.0])
-    np.savez(
-        tmp_path / "run.npz",
-        **{
-            "daq time": TIME * 1e3, "muscle pressure (kPa)": 300.0 * LIFT,
-            "time valve [s]": changes, "valve [V]": np.array([5.0, 6.0, 4.0, 5.5, 5.0]),
-        },
-    )  # fmt: skip
-    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder()).logs
+    series = {"daq time": TIME * 1e3, "muscle pressure (kPa)": 300.0 * LIFT}
+    series["time valve [s]"] = np.array([0.0, 3.0, 4.0, 11.0, 19.0])
+    series["valve [V]"] = np.array([5.0, 6.0, 4.0, 5.5, 5.0])
+    item = of_one(npz(tmp_path, **series))
     matches = {match.channel: match for match in item.matches}
     assert matches["valve_command"].hold
     assert matches["valve_command"].time["column"] == "time valve"
@@ -109,43 +99,32 @@ def test_events_are_held_and_clocks_in_milliseconds_are_seen(tmp_path: Path) -> 
 
 def test_different_rates_are_told(tmp_path: Path) -> None:
     slow = np.arange(1000) * 0.02
-    np.savez(
-        tmp_path / "run.npz",
-        **{"t p1": TIME, "p1 [bar]": LIFT, "t angle": slow, "angle [deg]": 20.0 + slow},
-    )
-    (item,) = propose([tmp_path / "run.npz"]).logs
-    assert (
-        "sampled at 50 to 200 Hz: all are laid on the 200 Hz of muscle_pressure" in item.remarks[0]
-    )
-    (tmp_path / "case.toml").write_text(propose([tmp_path / "run.npz"]).case_toml(tmp_path))
-    pamrs.rigs.shoulder().to_toml(tmp_path / "rig.toml")
-    assert load_case(tmp_path).recordings[0].sample_time == 5e-3
+    series = {"t p1": TIME, "p1 [bar]": LIFT, "t angle": slow, "angle [deg]": 20.0 + slow}
+    proposal = propose([npz(tmp_path, **series)])
+    told = "sampled at 50 to 200 Hz: all are laid on the 200 Hz of muscle_pressure"
+    assert told in proposal.logs[0].remarks[0]
+    assert case_of(tmp_path, proposal).recordings[0].sample_time == 5e-3
 
 
 def test_a_sensor_in_volts_is_told(tmp_path: Path) -> None:
-    np.savez(tmp_path / "run.npz", t=TIME, **{"muscle_pressure_raw [V]": LIFT, "angle [deg]": LIFT})
-    (item,) = propose([tmp_path / "run.npz"]).logs
+    raw = {"muscle_pressure_raw [V]": LIFT, "angle [deg]": LIFT}
+    item = of_one(npz(tmp_path, t=TIME, **raw), None)
     assert any("is in V: give from and to" in text for text in item.remarks)
-    assert [match.channel for match in item.matches] == ["joint_angle"]
+    assert list(channels_in(item)) == ["joint_angle"]
 
 
 def test_without_clock_or_channel(tmp_path: Path) -> None:
-    np.savez(tmp_path / "run.npz", p1=LIFT, q=LIFT)
-    (item,) = propose([tmp_path / "run.npz"]).logs
-    assert any("p1 has no clock" in text for text in item.remarks)
-    text = propose([tmp_path / "run.npz"], sample_time=0.005).case_toml(tmp_path)
+    file = npz(tmp_path, p1=LIFT, q=LIFT)
+    assert any("p1 has no clock" in text for text in of_one(file, None).remarks)
+    text = propose([file], sample_time=0.005).case_toml(tmp_path)
     assert "sample_time = 0.005" in text
     with pytest.raises(ParameterError, match="sample_time = 0"):
-        propose([tmp_path / "run.npz"], sample_time=0.0)
-    np.savez(tmp_path / "none.npz", zzz=LIFT)
+        propose([file], sample_time=0.0)
     with pytest.raises(RecordingError, match="no channel was recognised"):
-        propose([tmp_path / "none.npz"]).case_toml(tmp_path)
+        propose([npz(tmp_path, zzz=LIFT)]).case_toml(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("heading", "name", "unit"),
-    rows_of(__file__, "headings"),
-)
+@pytest.mark.parametrize(("heading", "name", "unit"), rows_of(__file__, "headings"))
 def test_headings(heading: str, name: str, unit: str) -> None:
     assert split_heading(heading) == (name, unit)
 
@@ -203,7 +182,7 @@ def test_units_that_physics_contradicts(
 ) -> None:
     channels = {"supply_pressure": SUPPLY * BAR, channel: values}
     units = {"supply_pressure": "bar", channel: said}
-    (found,) = suspicions(channels, units, pamrs.rigs.shoulder())
+    (found,) = suspicions(channels, units, SHOULDER)
     assert (found.channel, found.likely) == (channel, likely)
     assert words in found.text
 
@@ -220,7 +199,7 @@ def test_lengths(said: str, factor: float, likely: str) -> None:
 
 
 def test_sound_recordings_are_not_suspected() -> None:
-    rig = pamrs.rigs.shoulder()
+    rig = SHOULDER
     channels = {
         "supply_pressure": SUPPLY * BAR,
         "muscle_pressure": VENTED * BAR,
@@ -228,10 +207,7 @@ def test_sound_recordings_are_not_suspected() -> None:
         "temperature": 293.0 + LIFT,
         "valve_command": 5.0 + LIFT,
     }
-    units = {
-        "supply_pressure": "bar", "muscle_pressure": "bar", "joint_angle": "deg",
-        "temperature": "K", "valve_command": "V",
-    }  # fmt: skip
+    units = dict(zip(channels, ("bar", "bar", "deg", "K", "V"), strict=True))
     assert suspicions(channels, units, rig) == []
     assert suspicions(channels, units) == []
     empty = {name: np.full(50, np.nan) for name in channels}
@@ -259,7 +235,7 @@ def test_a_curve_that_only_passes_the_ambient_pressure_is_not_called_absolute(
 
 def test_a_pressure_that_another_one_agrees_with_is_not_suspected() -> None:
     """Whatever the rig file says that the tank once had."""
-    low = pamrs.rigs.shoulder().with_parameters({"supply.initial_pressure": 1e5})
+    low = SHOULDER.with_parameters({"supply.initial_pressure": 1e5})
     muscle = np.maximum(6.2 * LIFT - 0.2, 0.0) * BAR
     channels = {"muscle_pressure": muscle, "supply_pressure": np.full(len(TIME), 6.2 * BAR)}
     assert suspicions(channels, {"muscle_pressure": "bar", "supply_pressure": "kPa"}, low) == []
@@ -289,8 +265,8 @@ def test_a_regulator_goes_as_far_as_it_is_set() -> None:
 
 
 def test_suspicions_stand_in_the_case(tmp_path: Path) -> None:
-    np.savez(tmp_path / "run.npz", t=TIME, **{"p_muscle [bar]": VENTED * 14.5})
-    proposal = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder())
+    file = npz(tmp_path, t=TIME, **{"p_muscle [bar]": VENTED * 14.5})
+    proposal = propose([file], SHOULDER)
     assert "read as psi" in proposal.case_toml(tmp_path)
 
 
@@ -305,10 +281,7 @@ def test_tables_as_programs_write_them(tmp_path: Path, program: str) -> None:
         for row in zip(TIME[:200], 3.0 * LIFT[:200], 20.0 + 60.0 * LIFT[:200], strict=True)
     ]
     (tmp_path / "run.txt").write_text(head + "\n".join(rows) + "\n", encoding="cp1252")
-    pamrs.rigs.shoulder().to_toml(tmp_path / "rig.toml")
-    proposal = propose([tmp_path / "run.txt"], pamrs.rigs.shoulder())
-    (tmp_path / "case.toml").write_text(proposal.case_toml(tmp_path), encoding="utf-8")
-    (only,) = load_case(tmp_path).recordings
+    (only,) = case_of(tmp_path, propose([tmp_path / "run.txt"], SHOULDER)).recordings
     assert only.sample_time == 5e-3
     assert set(only.channels) == {"muscle_pressure", "joint_angle"}
     pressure = only.channels["muscle_pressure"]
@@ -317,9 +290,9 @@ def test_tables_as_programs_write_them(tmp_path: Path, program: str) -> None:
 
 def test_a_load_frames_load_cell_is_its_force(tmp_path: Path) -> None:
     """Its diagnosis is of the force alone."""
-    table = tmp_path / "frame.csv"
-    rows = "\n".join(f"{k / 100};{2 + 0.01 * k};{50 + k};{270 - 0.1 * k}" for k in range(50))
-    table.write_text(f"time [s];p [bar];load_cell [N];position [mm]\n{rows}\n", encoding="utf-8")
+    k = np.arange(50.0)
+    columns = {"time [s]": k / 100, "p [bar]": 2 + 0.01 * k, "load_cell [N]": 50 + k}
+    table = write_table(tmp_path / "frame.csv", columns | {"position [mm]": 270 - 0.1 * k})
     found = propose([table], pamrs.rigs.named("bench")).case_toml(tmp_path)
     assert 'force = { column = "load_cell", unit = "N" }' in found
 
@@ -327,13 +300,12 @@ def test_a_load_frames_load_cell_is_its_force(tmp_path: Path) -> None:
 def proposed(tmp_path: Path, names: list[str], rig: pamrs.Rig | None) -> tuple[dict[str, str], str]:
     """Which series of a log are proposed as what, and what is remarked; all are near 21."""
     values = {name: 21.0 + 0.1 * k + LIFT for k, name in enumerate(names)}
-    np.savez(tmp_path / "run.npz", t=TIME, **{"muscle_pressure [bar]": VENTED}, **values)
-    (item,) = propose([tmp_path / "run.npz"], rig).logs
-    found = {match.series.name: match.channel for match in item.matches}
+    item = of_one(npz(tmp_path, t=TIME, **{"muscle_pressure [bar]": VENTED}, **values), rig)
+    found = {name: channel for channel, name in channels_in(item).items()}
     return found, "; ".join(item.remarks)
 
 
-@pytest.mark.parametrize("rig", [None, pamrs.rigs.shoulder()])
+@pytest.mark.parametrize("rig", [None, SHOULDER])
 @pytest.mark.parametrize(
     "names",
     [
@@ -351,7 +323,7 @@ def test_no_room_is_guessed(tmp_path: Path, names: list[str], rig: pamrs.Rig | N
     assert "ambient_temperature" not in told
 
 
-@pytest.mark.parametrize("rig", [None, pamrs.rigs.shoulder()])
+@pytest.mark.parametrize("rig", [None, SHOULDER])
 @pytest.mark.parametrize(
     "name",
     ["ambient_temperature", "Room temperature [degC]", "T_Umgebung [degC]", "tamb", "Temp Raum"],
@@ -381,7 +353,7 @@ def test_a_muscle_above_its_recorded_supply_is_suspected(
     supply: float, muscle: float, suspected: set[str]
 ) -> None:
     """Whatever the rig file says that the tank once had."""
-    rig = pamrs.rigs.shoulder().with_parameters({"supply.initial_pressure": 13.8e5})
+    rig = SHOULDER.with_parameters({"supply.initial_pressure": 13.8e5})
     if supply > 20.0:
         rig = rig.with_parameters({"supply.initial_pressure": 6e5})
     channels = {
@@ -397,39 +369,33 @@ def test_a_muscle_above_its_recorded_supply_is_suspected(
 
 
 def test_channels_that_are_missing_are_explained(tmp_path: Path) -> None:
-    np.savez(tmp_path / "run.npz", **{"t": TIME, "p_muscle [bar]": VENTED})
-    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder()).logs
-    told = next(text for text in item.remarks if text.startswith("not found in this log: "))
+    file = npz(tmp_path, t=TIME, **{"p_muscle [bar]": VENTED})
+
+    def missing(rig: pamrs.Rig) -> str:
+        remarks = of_one(file, rig).remarks
+        return next(text for text in remarks if text.startswith("not found in this log: "))
+
+    told = missing(SHOULDER)
     assert "valve_command (voltage of the valve)" in told
     assert "joint_torque (torque of the muscles at the joint, by a torque sensor; not need" in told
-    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.bench()).logs
-    told = next(text for text in item.remarks if text.startswith("not found in this log: "))
+    told = missing(pamrs.rigs.bench())
     assert told.endswith("force (pull of the muscles, by a load cell)")  # which a frame needs
 
 
 def test_columns_that_are_no_channel_are_said(tmp_path: Path) -> None:
     data = signals()
-    series = {
-        "t": data["t"],
-        "Ventil [V]": np.full(N, 5.0),
-        "Vordruck [bar]": 7.0 - 0.1 * data["t"],
-        "Druck [bar]": data["p1"],
-        "Winkel [deg]": data["angle"],
-        "Motorstrom [A]": np.sin(data["t"]),
-        "seq": np.arange(N),
-    }
-    np.savez(tmp_path / "run.npz", **series)
-    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder()).logs
-    found = {match.channel: match.series.name for match in item.matches}
+    series = {"Ventil [V]": np.full(N, 5.0), "Vordruck [bar]": 7.0 - 0.1 * data["t"]}
+    series |= {"Druck [bar]": data["p1"], "Winkel [deg]": data["angle"]}
+    series |= {"Motorstrom [A]": np.sin(data["t"]), "seq": np.arange(N)}
+    item = of_one(npz(tmp_path, t=data["t"], **series))
+    found = channels_in(item)
     assert found["supply_pressure"] == "Vordruck"
     assert found["muscle_pressure"] == "Druck"
-    told = [text for text in item.remarks if text.startswith("not used: ")]
-    assert len(told) == 1
-    assert "seq" not in told[0]
+    (told,) = [text for text in item.remarks if text.startswith("not used: ")]
+    assert "seq" not in told
 
 
 def test_a_preposition_is_no_supply(tmp_path: Path) -> None:
     data = signals()
-    np.savez(tmp_path / "run.npz", **{"t": data["t"], "Druck vor Kolben [bar]": data["p1"]})
-    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder()).logs
+    item = of_one(npz(tmp_path, t=data["t"], **{"Druck vor Kolben [bar]": data["p1"]}))
     assert [match.channel for match in item.matches] == ["muscle_pressure"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +45,8 @@ def lively(seed: int = 3) -> dict[str, Array]:
 
 
 def text(data: dict[str, Array], header: str = HEADER, rows: Any = slice(None)) -> str:
-    table = np.column_stack([data["time"], *(data[name] for name in ("valve_command", *SENSORS))])[
-        rows
-    ]
-    lines = [
-        f"{t:.4f},{u:.4f},{supply:.1f},{muscle:.1f},{angle:.4f}"
-        for t, u, supply, muscle, angle in table
-    ]
+    table = np.column_stack([data[name] for name in ("time", "valve_command", *SENSORS)])[rows]
+    lines = [f"{t:.4f},{u:.4f},{s:.1f},{m:.1f},{a:.4f}" for t, u, s, m, a in table]
     return "\n".join([header, *lines]) + "\n"
 
 
@@ -82,25 +78,12 @@ def test_clean_recording_in_si(tmp_path: Path) -> None:
     assert recording.issues == []
     assert recording.valid().all()
     np.testing.assert_allclose(recording.time, np.arange(N) * DT, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(
-        recording.channels["joint_angle"], np.radians(data["joint_angle"]), atol=2e-6
-    )
-    np.testing.assert_allclose(
-        recording.channels["muscle_pressure"], data["muscle_pressure"], atol=0.1
-    )
+    found = recording.channels
+    np.testing.assert_allclose(found["joint_angle"], np.radians(data["joint_angle"]), atol=2e-6)
+    np.testing.assert_allclose(found["muscle_pressure"], data["muscle_pressure"], atol=0.1)
     assert recording.units["joint_angle"] == "rad"
     assert recording.duration == pytest.approx((N - 1) * DT)
     assert "run" in repr(recording)
-
-
-@pytest.mark.parametrize(
-    ("unit", "scale"), [("bar", 1e5), ("kPa", 1e3), ("psi", 6894.757293168361), ("mbar", 100.0)]
-)
-def test_units_are_converted(tmp_path: Path, unit: str, scale: float) -> None:
-    rows = "\n".join(f"{i * 10},{0.1 * i}" for i in range(30))
-    recording = load(tmp_path, f"time [ms],muscle_pressure [{unit}]\n{rows}\n")
-    assert recording.sample_time == pytest.approx(0.01)
-    np.testing.assert_allclose(recording.channels["muscle_pressure"], 0.1 * np.arange(30) * scale)
 
 
 def test_time_starts_at_zero(tmp_path: Path) -> None:
@@ -112,27 +95,12 @@ def test_time_starts_at_zero(tmp_path: Path) -> None:
     assert recording.issues == []
 
 
-def test_gzip_bom_quotes_and_crlf(tmp_path: Path) -> None:
-    content = '\ufeff"time [s]","muscle_pressure [bar]"\r\n' + "".join(
-        f"{0.1 * i},{i % 7}\r\n" for i in range(40)
-    )
-    file = tmp_path / "run.csv.gz"
-    file.write_bytes(gzip.compress(content.encode()))
-    recording = load_recording(file)
-    assert (recording.name, len(recording)) == ("run", 40)
-
-
 def test_columns_without_header_thousands_and_semicolons(tmp_path: Path) -> None:
     stamps = [f"{i * 100_000:,}".replace(",", ".") for i in range(1200)]
     content = "".join(f"{stamp};3.{i % 3};7.6{i % 4}\r\n" for i, stamp in enumerate(stamps))
-    recording = load(
-        tmp_path,
-        content,
-        columns=["time [us]", "", "muscle_pressure [bar]"],
-        header=False,
-        delimiter=";",
-        thousands={"time": "."},
-    )
+    form = {"header": False, "delimiter": ";", "thousands": {"time": "."}}
+    columns = ["time [us]", "", "muscle_pressure [bar]"]
+    recording = load(tmp_path, content, columns=columns, **form)
     assert list(recording.channels) == ["muscle_pressure"]
     assert recording.sample_time == pytest.approx(0.1)
     assert len(recording) == 1200
@@ -156,9 +124,8 @@ def test_rows_without_a_clock(tmp_path: Path) -> None:
 
 def test_blank_separated(tmp_path: Path) -> None:
     content = "".join(f"  {i * 10}   {i % 5}.5 \n" for i in range(50))
-    recording = load(
-        tmp_path, content, columns=["time [ms]", "force [N]"], header=False, delimiter=" "
-    )
+    columns = ["time [ms]", "force [N]"]
+    recording = load(tmp_path, content, columns=columns, header=False, delimiter=" ")
     assert recording.channels["force"][1] == 1.5
 
 
@@ -191,11 +158,7 @@ BAD = [
     ("time [s],muscle_pressure\n" + ROWS, {}, ["'muscle_pressure'", "no unit", "[Pa]"]),
     ("time [s],muscle_pressure []\n" + ROWS, {}, ["muscle_pressure []", "no unit"]),
     ("time,muscle_pressure [bar]\n" + ROWS, {}, ["'time'", "no unit"]),
-    (
-        "time [s],muscle_pressure [V]\n" + ROWS,
-        {},
-        ["muscle_pressure [V]", "wrong dimension", "'Pa'"],
-    ),
+    ("time [s],muscle_pressure [V]\n" + ROWS, {}, ["[V]", "wrong dimension", "'Pa'"]),
     ("time [s],muscle_pressure [Bar]\n" + ROWS, {}, ["muscle_pressure [Bar]", "'bar'"]),
     ("time [s],joint_angle [bar]\n" + ROWS, {}, ["joint_angle [bar]", "'rad'"]),
     ("time [s],muscle_presure [bar]\n" + ROWS, {}, ["'muscle_presure [bar]'", "'muscle_pressure'"]),
@@ -209,17 +172,16 @@ BAD = [
     ("time [s];force [N]\n0;1\n1;2\n", {}, ["time [s];force [N]"]),
     ("time [s],force [N]\n" + "0,1,2\n" * 9, {}, ["2 cells", "row 2"]),
     ("time [s],force [N]\n" + ROWS, {"columns": ["time [s]"]}, ["1 headings", "2 columns"]),
-    (
-        "time [s],force [N]\n" + ROWS,
-        {"columns": {"torque": "force [N]"}},
-        ["'torque'", "force [N]"],
-    ),
+    ("time [s],force [N]\n" + ROWS, {"columns": {"torque": "force [N]"}}, ["'torque'", "force"]),
     ("time [s],force [N]\n" + ROWS, {"columns": "force [N]"}, ["columns"]),
     (ROWS, {"header": False}, ["columns must list"]),
     ("time [s],force [N]\n" + ROWS, {"role": "test"}, ["'test'", "'held_out'"]),
     ("time [s],force [N]\n" + ROWS, {"sample_time": 0.0}, ["sample_time"]),
     ("time [s],force [N]\n" + ROWS, {"sample_time": math.nan}, ["sample_time"]),
     ("time [s],force [N]\n" + ROWS, {"delimiter": ""}, ["delimiter"]),
+    ("time [s],force [N]\n" + ROWS, {"decimal": "x"}, ["decimal = 'x' is not allowed"]),
+    ("", {"decimal": ",", "thousands": ","}, ["it is the decimal mark"]),
+    ('"time [s],force [N]\n' + ROWS * 20000, {}, ["a quote that is opened"]),
     ("time [s],force [N]\n" + ROWS, {"thousands": {"torque": "."}}, ["'torque'"]),
 ]
 
@@ -229,8 +191,7 @@ def test_mistakes_name_file_and_column(
     tmp_path: Path, content: str, options: dict[str, Any], wanted: list[str]
 ) -> None:
     message = refused(tmp_path, content, **options)
-    for words in wanted:
-        assert words in message, message
+    assert all(words in message for words in wanted), message
 
 
 def test_all_bad_columns_at_once(tmp_path: Path) -> None:
@@ -250,15 +211,12 @@ def test_all_bad_columns_at_once(tmp_path: Path) -> None:
 def test_impossible_values_name_the_unit_that_fits(
     tmp_path: Path, heading: str, value: float, likely: str
 ) -> None:
-    file = tmp_path / "a.csv"
     rows = "".join(f"{0.01 * k:.2f},{value * (1 + 1e-4 * k)}\n" for k in range(100))
-    file.write_text(f"time [s],{heading}\n{rows}", encoding="utf-8")
-    with pytest.raises(RecordingError, match=f"not possible.*{likely}"):
-        load_recording(file)
+    assert re.search(f"not possible.*{likely}", refused(tmp_path, f"time [s],{heading}\n{rows}"))
     name, _, unit = heading.partition(" [")
     channels = {name: {"column": name, "unit": unit[:-1]}}
     with pytest.raises(RecordingError, match=f"not possible.*{likely}"):
-        load_recordings(file, channels=channels, time="time")
+        load_recordings(tmp_path / "run.csv", channels=channels, time="time")
 
 
 def test_swapped_columns_are_seen_by_impossible_values(tmp_path: Path) -> None:
@@ -279,8 +237,6 @@ def test_unreadable_files(tmp_path: Path) -> None:
         ("zero.csv", b"time [s]\x00,"),
         ("broken.csv.gz", b"no gzip at all"),
         ("cut.csv.gz", gzip.compress(b"time [s],force [N]\n0,1\n" * 50)[:30]),
-        ("sheet.xlsx", b"PK"),
-        ("broken.parquet", b"PAR1"),
     ]:
         (tmp_path / name).write_bytes(content)
         with pytest.raises(RecordingError, match=name):
@@ -292,16 +248,14 @@ def test_a_column_of_a_table_of_numbers_is_named(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     frame = pandas.DataFrame({"time [s]": [0.0, 0.1], "force [N]": ["1", "much"]})
     frame.to_parquet(tmp_path / "made.parquet")
-    with pytest.raises(
-        RecordingError, match=r"made\.parquet: column 'force \[N\]', row 3: 'much' is"
-    ):
+    message = r"made\.parquet: column 'force \[N\]', row 3: 'much' is"
+    with pytest.raises(RecordingError, match=message):
         load_recording(tmp_path / "made.parquet")
 
 
 def test_the_help_names_every_ending_that_is_read() -> None:
-    assert all(
-        f"``{ending}``" in load_recording.__doc__ for ending in (*TEXT, ".parquet") if ending
-    )
+    endings = filter(None, (*TEXT, ".parquet"))
+    assert all(f"``{ending}``" in load_recording.__doc__ for ending in endings)
 
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -342,20 +296,6 @@ def test_nan_rows_are_masked_and_not_bridged(tmp_path: Path) -> None:
     assert recording.segments("muscle_pressure", minimum=200) == [(140, N)]
 
 
-def test_empty_cells_and_cut_last_row(tmp_path: Path) -> None:
-    lines = text(lively()).splitlines()
-    lines[11] = ",".join([*lines[11].split(",")[:-1], ""])
-    lines[12] = ",".join([*lines[12].split(",")[:-1], "NaN"])
-    lines[-1] = lines[-1][:20]
-    recording = load(tmp_path, "\n".join(lines))
-    assert not recording.mask["joint_angle"][[10, 11]].any()
-    assert len(recording) == N - 1
-    assert kinds(recording) == {"nan", "log"}
-    assert f"rows with fewer than 5 cells: 1 (first: row {N + 1}), left out" in {
-        issue.text for issue in recording.issues
-    }
-
-
 def test_missing_samples_leave_masked_holes(tmp_path: Path) -> None:
     data = lively()
     keep = np.random.default_rng(1).random(N) > 0.3
@@ -366,9 +306,8 @@ def test_missing_samples_leave_masked_holes(tmp_path: Path) -> None:
     assert np.array_equal(recording.valid(), keep)
     kept = recording.channels["muscle_pressure"][keep]
     np.testing.assert_allclose(kept, data["muscle_pressure"][keep], atol=0.1)
-    gaps = [issue for issue in recording.issues if issue.kind == "gap"]
-    assert len(gaps) == 1
-    assert "30 %" in gaps[0].text or "29 %" in gaps[0].text
+    (gap,) = [issue for issue in recording.issues if issue.kind == "gap"]
+    assert "30 %" in gap.text or "29 %" in gap.text
 
 
 def test_one_gap_is_told_with_its_times(tmp_path: Path) -> None:
@@ -381,54 +320,31 @@ def test_one_gap_is_told_with_its_times(tmp_path: Path) -> None:
     assert np.array_equal(recording.valid(), keep)
 
 
-def test_clock_jumping_back(tmp_path: Path) -> None:
+def jumping(tmp_path: Path, by: float) -> tuple[dict[str, Array], Recording]:
+    """A recording whose clock jumps in the middle."""
     data = lively()
-    data["time"] = np.where(np.arange(N) < 2000, data["time"], data["time"] - 3.0)
-    recording = load(tmp_path, data)
+    data["time"] = np.where(np.arange(N) < 2000, data["time"], data["time"] + by)
+    return data, load(tmp_path, data)
+
+
+def test_clock_jumping_back(tmp_path: Path) -> None:
+    data, recording = jumping(tmp_path, -3.0)
     (issue,) = recording.issues
     assert issue.kind == "clock_jump"
     assert "back by 2.995 s" in issue.text
-    mask = recording.valid()
     assert recording.segments() == [(0, 2000), (2010, N + 10)]
-    measured = recording.channels["muscle_pressure"][mask]
+    measured = recording.channels["muscle_pressure"][recording.valid()]
     np.testing.assert_allclose(measured, data["muscle_pressure"], atol=0.1)
 
 
-def test_clock_jumping_far_forward(tmp_path: Path) -> None:
-    data = lively()
-    data["time"] = np.where(np.arange(N) < 2000, data["time"], data["time"] + 1e6)
-    recording = load(tmp_path, data)
-    assert kinds(recording) == {"clock_jump"}
-    assert len(recording) == N + 10
-    assert "forward" in recording.issues[0].text
-
-
-def test_clock_jumping_a_little_forward_is_a_hole(tmp_path: Path) -> None:
-    data = lively()
-    data["time"] = np.where(np.arange(N) < 2000, data["time"], data["time"] + 2.0)
-    recording = load(tmp_path, data)
-    assert kinds(recording) == {"gap"}
-    assert not recording.valid()[2000:2399].any()
-
-
-def test_rows_of_one_time_are_spread_over_it(tmp_path: Path) -> None:
-    data = lively()
-    data["time"][1500:1504] = data["time"][1500]
-    recording = load(tmp_path, data)
-    assert kinds(recording) == {"log"}
-    assert "up to 4 rows of one" in recording.issues[0].text
-    assert recording.valid().all()
-    np.testing.assert_allclose(
-        recording.channels["muscle_pressure"], data["muscle_pressure"], atol=0.1
-    )
-
-
-def test_every_row_twice(tmp_path: Path) -> None:
-    recording = load(tmp_path, text(lively(), rows=np.repeat(np.arange(N), 2)))
-    assert len(recording) == N
-    assert recording.valid().all()
-    (issue,) = recording.issues
-    assert issue.text == f"rows that are there twice: {N}, left out once"
+def test_clock_jumping_forward(tmp_path: Path) -> None:
+    _, far = jumping(tmp_path, 1e6)
+    assert kinds(far) == {"clock_jump"}
+    assert len(far) == N + 10
+    assert "forward" in far.issues[0].text
+    _, hole = jumping(tmp_path, 2.0)  # a little
+    assert kinds(hole) == {"gap"}
+    assert not hole.valid()[2000:2399].any()
 
 
 def test_jitter_is_interpolated_between_neighbours(tmp_path: Path) -> None:
@@ -547,8 +463,41 @@ def test_every_canonical_channel_is_read(tmp_path: Path) -> None:
         for name, channel in CHANNELS.items()
         if name != "time"
     ]
-    rows = "\n".join(
-        f"{i}," + ",".join(cell.format(i * 7 % 11) for cell in cells) for i in range(9)
-    )
-    recording = load(tmp_path, f"{header}\n{rows}\n")
+    rows = [",".join([str(i), *(cell.format(i * 7 % 11) for cell in cells)]) for i in range(9)]
+    recording = load(tmp_path, "\n".join([header, *rows]))
     assert ["time", *recording.channels] == list(CHANNELS)
+
+
+# ------------------------------------------------------- numbers as they are written
+
+
+def test_a_decimal_comma_between_commas_is_no_number(tmp_path: Path) -> None:
+    """Two columns once became one, which stood in both: 1 bar was read as 10 kPa."""
+    rows = "".join(f"{k},{1 + k % 3}\n" for k in range(40))
+    read = load(tmp_path, f"time [s],muscle_pressure [bar]\n{rows}", decimal=",")
+    assert np.allclose(read.channels["muscle_pressure"][:3], [1e5, 2e5, 3e5])
+
+
+def test_points_beside_a_decimal_comma_are_asked(tmp_path: Path) -> None:
+    content = "time [s];muscle_pressure [kPa]\n0,0;980\n1,0;1.520\n2,0;990\n"
+    form = {"delimiter": ";", "decimal": ","}
+    assert "'1.520' has a point and decimal is ','" in refused(tmp_path, content, **form)
+    read = load(tmp_path, content, **form, thousands={"muscle_pressure": "."})
+    assert np.allclose(read.channels["muscle_pressure"], [980e3, 1520e3, 990e3])
+
+
+def test_an_underscore_is_no_part_of_a_number(tmp_path: Path) -> None:
+    rows = "".join(f"{k},{'1_0' if k == 7 else 2 + k % 3}\n" for k in range(40))
+    read = load(tmp_path, f"time [s],muscle_pressure [bar]\n{rows}")
+    assert np.flatnonzero(~read.mask["muscle_pressure"]).tolist() == [7]
+
+
+def test_series_of_another_length_are_said(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    units = {"time": "s", "muscle_pressure": "bar", "joint_angle": "deg", "temperature": "K"}
+    with h5py.File(tmp_path / "run.h5", "w") as store:
+        for name, unit in units.items():
+            store[name] = np.arange(10.0 if unit == "K" else 100.0)
+            store[name].attrs["unit"] = unit
+    said = [issue.text for issue in load_recording(tmp_path / "run.h5").issues]
+    assert any("'temperature': not 100 values" in text for text in said)

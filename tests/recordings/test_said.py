@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,38 +15,25 @@ from pamrs.diagnosis.prepare import noted_units
 from pamrs.errors import CaseError
 from pamrs.recordings import Proposal, load_case, load_recording, load_recordings, propose
 from pamrs.recordings.logs import read_log, split_heading, understood_unit
-from tests.recordings.written import write_workbook
+from tests.recordings.written import SHOULDER, case_of, write_table, write_workbook
 
-SHOULDER = pamrs.rigs.shoulder()
 COUNT = 100
 TIME = 0.02 * np.arange(COUNT)
 WAVE = np.sin(3.0 * TIME) ** 2
 ANGLE = 30.0 + 20.0 * WAVE
 
 
-def written(file: Path, columns: dict[str, Sequence[object]], mark: str = ";") -> Path:
-    lines = [mark.join(columns)]
-    lines += [mark.join(map(str, row)) for row in zip(*columns.values(), strict=True)]
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return file
+PLAIN = {"time [s]": TIME, "valve [V]": 5.0 + WAVE}
 
 
 def few(values: np.ndarray) -> list[str]:
     return [f"{value:.6g}" for value in values]
 
 
-def log(tmp_path: Path, heading: str, values: Sequence[object]) -> Proposal:
+def log(tmp_path: Path, heading: str, values: np.ndarray) -> Proposal:
     """A log of a shoulder with one column of this heading."""
-    columns: dict[str, Sequence[object]] = {
-        "time [s]": few(TIME), "valve [V]": few(5.0 + WAVE), "angle [deg]": few(ANGLE)
-    }  # fmt: skip
-    return propose([written(tmp_path / "run.csv", columns | {heading: values})], SHOULDER)
-
-
-def case_of(tmp_path: Path, proposal: Proposal) -> pamrs.Case:
-    SHOULDER.to_toml(tmp_path / "rig.toml")
-    (tmp_path / "case.toml").write_text(proposal.case_toml(tmp_path), encoding="utf-8")
-    return load_case(tmp_path, allow_outside=True)
+    columns = PLAIN | {"angle [deg]": ANGLE, heading: values}
+    return propose([write_table(tmp_path / "run.csv", columns)], SHOULDER)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +59,7 @@ def test_a_word_that_may_be_no_unit_is_none(heading: str) -> None:
 
 
 def test_a_unit_inside_a_name_reaches_the_recording(tmp_path: Path) -> None:
-    (only,) = case_of(tmp_path, log(tmp_path, "p1_psi_filt", few(14.5 * (1 + WAVE)))).recordings
+    (only,) = case_of(tmp_path, log(tmp_path, "p1_psi_filt", 14.5 * (1 + WAVE))).recordings
     np.testing.assert_allclose(
         only.channels["muscle_pressure"], 14.5 * 6894.757293 * (1 + WAVE), rtol=1e-5
     )
@@ -81,14 +67,14 @@ def test_a_unit_inside_a_name_reaches_the_recording(tmp_path: Path) -> None:
 
 
 def test_an_absolute_pressure_behind_its_bracket_becomes_gauge(tmp_path: Path) -> None:
-    proposal = log(tmp_path, "p_muscle [bar] abs", few(1.01325 + WAVE))
+    proposal = log(tmp_path, "p_muscle [bar] abs", 1.01325 + WAVE)
     (only,) = case_of(tmp_path, proposal).recordings
     np.testing.assert_allclose(only.channels["muscle_pressure"], 1e5 * WAVE, atol=5.0)
     assert "absolute" in only.notes["muscle_pressure"]
 
 
 def test_atm_in_a_name_is_doubted(tmp_path: Path) -> None:
-    (item,) = log(tmp_path, "P1_ATM", few(1.0 + WAVE)).logs
+    (item,) = log(tmp_path, "P1_ATM", 1.0 + WAVE).logs
     assert "muscle_pressure" not in {match.channel for match in item.matches}
     assert "ATM in its name may be the unit, or say" in item.left[0].text
 
@@ -96,8 +82,8 @@ def test_atm_in_a_name_is_doubted(tmp_path: Path) -> None:
 def test_english_thousands_in_quotes_are_read_and_said(tmp_path: Path) -> None:
     pascal = 1e5 * (0.001 + WAVE)
     quoted = [f'"{value:,.1f}"' for value in pascal]
-    columns = {"time [s]": few(TIME), "valve [V]": few(5.0 + WAVE), "p_muscle [Pa]": quoted}
-    read = read_log(written(tmp_path / "run.csv", columns, ","))
+    file = write_table(tmp_path / "run.csv", PLAIN | {"p_muscle [Pa]": quoted}, ",")
+    read = read_log(file)
     np.testing.assert_allclose(read.series["p_muscle"].values, pascal, atol=0.051)
     assert any("p_muscle: commas part thousands, as in " in text for text in read.remarks)
 
@@ -116,15 +102,11 @@ def test_a_counter_that_wraps_below_zero_is_counted_on(
 ) -> None:
     counts = (first - 120 * WAVE).round()
     assert counts.min() < 0
-    file = written(
-        tmp_path / "run.csv",
-        {"time [s]": few(TIME), "encoder [counts]": (counts % 2**bits).astype(np.int64).tolist()},
-    )
-    (found,) = load_recordings(
-        file,
-        time="time",
-        channels={"joint_angle": {"column": "encoder", "unit": "deg", "scale": 0.1}},
-    )
+    whole = (counts % 2**bits).astype(np.int64).tolist()
+    columns = {"time [s]": TIME, "encoder [counts]": whole}
+    file = write_table(tmp_path / "run.csv", columns)
+    channels = {"joint_angle": {"column": "encoder", "unit": "deg", "scale": 0.1}}
+    (found,) = load_recordings(file, time="time", channels=channels)
     np.testing.assert_allclose(found.channels["joint_angle"], np.radians(0.1 * counts), atol=1e-9)
     assert any(f"overflows of a counter of {bits} bits: " in issue.text for issue in found.issues)
 
@@ -137,12 +119,12 @@ def clock(seconds: float) -> str:
 
 
 def test_a_clock_that_is_set_back_in_autumn_is_joined_and_said(tmp_path: Path) -> None:
-    columns = {"Zeit": [clock(t) for t in TIME], "p_muscle [bar]": few(1 + WAVE)}
-    read = read_log(written(tmp_path / "run.csv", columns))
+    columns = {"Zeit": [clock(t) for t in TIME], "p_muscle [bar]": 1 + WAVE}
+    read = read_log(write_table(tmp_path / "run.csv", columns))
     np.testing.assert_allclose(read.series["Zeit"].values, TIME, atol=1e-6)
     assert any("goes back by an hour after '2026-10-25 02:59:59" in text for text in read.remarks)
     world = columns | {"Zeit": [f"{clock(t)} UTC" for t in TIME]}
-    read = read_log(written(tmp_path / "world.csv", world))
+    read = read_log(write_table(tmp_path / "world.csv", world))
     assert not any("goes back" in text for text in read.remarks)
 
 
@@ -163,12 +145,9 @@ def in_three_parts(tmp_path: Path, *more: str) -> pamrs.Case:
     pressure = few(1 + WAVE)
     pressure[7] = "OL"
     runs = [i // 40 for i in range(COUNT)]
-    columns = {"time [s]": few(TIME), "p_muscle [bar]": pressure, "run": runs}
-    written(tmp_path / "run.csv", columns)
-    SHOULDER.to_toml(tmp_path / "rig.toml")
-    text = TWO + "".join(ENTRY.format(more=each) for each in more)
-    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    return load_case(tmp_path)
+    columns = {"time [s]": TIME, "p_muscle [bar]": pressure, "run": runs}
+    write_table(tmp_path / "run.csv", columns)
+    return case_of(tmp_path, TWO + "".join(ENTRY.format(more=each) for each in more))
 
 
 def test_parts_that_no_recording_takes_are_repeated_as_a_warning(tmp_path: Path) -> None:
@@ -217,8 +196,8 @@ def test_the_printed_command_accepts_the_paths_that_were_written(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     SHOULDER.to_toml(tmp_path / "my_rig.toml")
-    columns = {"time [s]": few(TIME), "valve [V]": few(5 + WAVE), "p_muscle [bar]": few(1 + WAVE)}
-    written(tmp_path / "my_log.csv", columns | {"angle [deg]": few(ANGLE)})
+    columns = PLAIN | {"p_muscle [bar]": 1 + WAVE, "angle [deg]": ANGLE}
+    write_table(tmp_path / "my_log.csv", columns)
     out = "." if inside else "my_case"
     asked = ["import", "my_log.csv", "--rig", "my_rig.toml", "--out", out]
     said = CliRunner().invoke(app, asked)

@@ -4,13 +4,11 @@ user is told. Nothing is guessed in the place of a unit that is written.
 
 from __future__ import annotations
 
-import json
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.writer import Writer
 from numpy.typing import NDArray
 
 import pamrs
@@ -26,6 +24,7 @@ from pamrs.recordings import (
     propose,
 )
 from pamrs.rig import load_rig
+from tests.recordings.written import SHOULDER, case_of, write_json_messages, write_table
 from tests.tables import rows_of
 
 Array = NDArray[np.float64]
@@ -35,18 +34,10 @@ TIME = np.arange(120) * 0.02
 GAUGE = 1e5 * (0.4 + 2.4 * np.sin(1.3 * TIME) ** 2)  # Pa
 ANGLE = 30.0 + 20.0 * np.sin(1.3 * TIME) ** 2
 STANDARD = 101325.0
-SHOULDER = pamrs.rigs.shoulder()
 
 
 def log(tmp_path: Path, columns: dict[str, Array]) -> Path:
-    file = tmp_path / "run.csv"
-    rows = zip(TIME, *columns.values(), strict=True)
-    lines = [
-        ";".join(["time [s]", *columns]),
-        *(";".join(f"{x:.7g}" for x in row) for row in rows),
-    ]
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return file
+    return write_table(tmp_path / "run.csv", {"time [s]": TIME, **columns})
 
 
 def of_unit(tmp_path: Path, heading: str, values: Array) -> tuple[Proposal, LogProposal]:
@@ -56,14 +47,8 @@ def of_unit(tmp_path: Path, heading: str, values: Array) -> tuple[Proposal, LogP
     return proposal, proposal.logs[0]
 
 
-def read(tmp_path: Path, proposal: Proposal, rig: pamrs.Rig = SHOULDER) -> Case:
-    rig.to_toml(tmp_path / "rig.toml")
-    (tmp_path / "case.toml").write_text(proposal.case_toml(tmp_path), encoding="utf-8")
-    return load_case(tmp_path, allow_outside=True)
-
-
 def pressure(tmp_path: Path, proposal: Proposal) -> tuple[Array, Recording]:
-    return pressure_of(read(tmp_path, proposal))
+    return pressure_of(case_of(tmp_path, proposal))
 
 
 def pressure_of(case: Case) -> tuple[Array, Recording]:
@@ -156,21 +141,23 @@ def test_a_unit_is_assumed_only_where_there_is_none_and_stays_marked(tmp_path: P
     (told,) = [text for text in item.remarks if "assumed" in text]
     assert told.startswith("p_muscle has no unit in the log: bar is assumed, its numbers are 0.4")
     assert 'assumed = "its numbers are 0.4' in proposal.case_toml(tmp_path)
-    case = read(tmp_path, proposal)
+    case = case_of(tmp_path, proposal)
     (again,) = noted_units(case)  # what a diagnosis puts among its warnings
     assert again.startswith("run: muscle_pressure is assumed to be in bar: its numbers are 0.4")
 
 
 def test_pounds_and_inches_are_no_newtons_and_millimetres(tmp_path: Path) -> None:
-    columns = {"p [bar]": GAUGE / 1e5, "force_lbf": 50.0 + ANGLE}
-    proposal = propose([log(tmp_path, columns)], pamrs.rigs.named("bench"))
-    assert {m.channel: m.unit for m in proposal.logs[0].matches}["force"] == "lbf"
-    columns = {"p [bar]": GAUGE / 1e5, "length_inch": 10.0 + ANGLE / 50.0}
-    proposal = propose([log(tmp_path, columns)], pamrs.rigs.named("bench"))
-    assert {m.channel: m.unit for m in proposal.logs[0].matches}["length"] == "in"
-    columns = {"p [bar]": GAUGE / 1e5, "force_lb": 50.0 + ANGLE}
-    (item,) = propose([log(tmp_path, columns)], pamrs.rigs.named("bench")).logs
-    assert [(each.channel, each.unit) for each in item.left] == [("force", "lbf")]
+    def proposed(heading: str, values: Array) -> LogProposal:
+        columns = {"p [bar]": GAUGE / 1e5, heading: values}
+        return propose([log(tmp_path, columns)], pamrs.rigs.named("bench")).logs[0]
+
+    units = [
+        {match.channel: match.unit for match in proposed(heading, values).matches}
+        for heading, values in (("force_lbf", 50.0 + ANGLE), ("length_inch", 10.0 + ANGLE / 50.0))
+    ]
+    assert (units[0]["force"], units[1]["length"]) == ("lbf", "in")
+    left = proposed("force_lb", 50.0 + ANGLE).left
+    assert [(each.channel, each.unit) for each in left] == [("force", "lbf")]
 
 
 def test_a_log_whose_only_unit_is_not_known_says_so(tmp_path: Path) -> None:
@@ -203,20 +190,17 @@ def test_the_recorded_ambient_pressure_is_subtracted(tmp_path: Path) -> None:
     assert any("0.93 bar (13.49 psi), is subtracted" in text for text in told)
     found, only = pressure(tmp_path, proposal)
     np.testing.assert_allclose(found, GAUGE, atol=2.0)
-    assert (
-        "the recorded ambient pressure, where the rig file says 1.013 bar"
-        in (only.notes["muscle_pressure"])
-    )
+    said = "the recorded ambient pressure, where the rig file says 1.013 bar"
+    assert said in only.notes["muscle_pressure"]
     (again,) = noted_units(load_case(tmp_path))
     assert again.startswith("run: muscle_pressure was recorded as an absolute pressure")
 
 
 def test_the_ambient_pressure_of_the_rig_file_is_subtracted(tmp_path: Path) -> None:
-    rig = pamrs.rig.parse_rig(
-        SHOULDER.to_toml_text().replace("value = 101325.0", "value = 93000.0")
-    )
+    text = SHOULDER.to_toml_text().replace("value = 101325.0", "value = 93000.0")
+    rig = pamrs.rig.parse_rig(text)
     columns = {"p_muscle [bar(a)]": (GAUGE + 9.3e4) / 1e5, "angle [deg]": ANGLE}
-    case = read(tmp_path, propose([log(tmp_path, columns)], rig), rig)
+    case = case_of(tmp_path, propose([log(tmp_path, columns)], rig), rig)
     np.testing.assert_allclose(case.recordings[0].channels["muscle_pressure"], GAUGE, atol=2.0)
 
 
@@ -226,11 +210,8 @@ def test_headings_that_say_it_all_say_that_they_are_absolute(tmp_path: Path) -> 
     only = load_recording(file, delimiter=";")
     np.testing.assert_allclose(only.channels["muscle_pressure"], GAUGE, atol=2.0)
     assert "the standard atmosphere, since nothing says another" in only.notes["muscle_pressure"]
-    (tmp_path / "case.toml").write_text(
-        'schema = "pamrs.case/1"\n[[recording]]\nfile = "run.csv"\ndelimiter = ";"\n'
-    )
-    SHOULDER.to_toml(tmp_path / "rig.toml")
-    (only,) = load_case(tmp_path).recordings
+    toml = 'schema = "pamrs.case/1"\n[[recording]]\nfile = "run.csv"\ndelimiter = ";"\n'
+    (only,) = case_of(tmp_path, toml).recordings
     assert "the ambient pressure of the rig file" in only.notes["muscle_pressure"]
     file = log(tmp_path, {"muscle_pressure [Pa(a)]": GAUGE, "ambient_pressure [hPa]": 0.0 * TIME})
     with pytest.raises(RecordingError, match="column 'ambient_pressure': 0 Pa and"):
@@ -255,8 +236,8 @@ NAMES = rows_of(__file__, "names")
 
 @pytest.mark.parametrize(("columns", "told"), NAMES)
 def test_names_on_a_rig_with_a_valve(tmp_path: Path, columns: dict[str, str], told: str) -> None:
-    values = {name: 20.0 + ANGLE if "°" in name or "deg" in name else 1.0 + GAUGE / 1e5
-              for name in columns}  # fmt: skip
+    angles = {name for name in columns if "°" in name or "deg" in name}
+    values = {name: 20.0 + ANGLE if name in angles else 1.0 + GAUGE / 1e5 for name in columns}
     (item,) = propose([log(tmp_path, values)], SHOULDER).logs
     found = {each.name: each.channel for each in item.listed if each.name != "time"}
     wanted = {name.partition(" [")[0]: channel for name, channel in columns.items()}
@@ -275,9 +256,8 @@ MEASURED = ["chamber pressure", "pressure", "Istdruck", "p_act", "p_meas", "Kamm
 @pytest.mark.parametrize("measured", MEASURED)
 def test_a_regulator_without_a_valve(tmp_path: Path, command: str, measured: str) -> None:
     """The only pressure is that of the chamber, and a rig without an inlet has no line_pressure."""
-    for unit in ("bar", ""):
-        columns = {f"{command} [{unit}]" if unit else command: 0.1 + GAUGE / 1e6,
-                   f"{measured} [{unit}]" if unit else measured: GAUGE / 1e6}  # fmt: skip
+    for unit in (" [bar]", ""):
+        columns = {f"{command}{unit}": 0.1 + GAUGE / 1e6, f"{measured}{unit}": GAUGE / 1e6}
         (item,) = propose([log(tmp_path, columns)], load_rig(REGULATED)).logs
         found = {match.series.name: match.channel for match in item.matches}
         assert found == {command: "supply_command", measured: "muscle_pressure"}
@@ -289,10 +269,9 @@ def test_a_regulator_without_a_valve(tmp_path: Path, command: str, measured: str
 )
 def test_commands_taken_as_gauges(file: Path) -> None:
     (item,) = propose([file], load_rig(REGULATED)).logs
-    assert {match.channel for match in item.matches} == {"supply_command", "muscle_pressure"}
-    assert [m.series.name for m in item.matches if m.channel == "supply_command"] == [
-        item.listed[1].name
-    ]
+    found = {match.channel: match.series.name for match in item.matches}
+    assert set(found) == {"supply_command", "muscle_pressure"}
+    assert found["supply_command"] == item.listed[1].name
 
 
 @pytest.mark.parametrize(
@@ -301,7 +280,7 @@ def test_commands_taken_as_gauges(file: Path) -> None:
 def test_units_that_were_not_known(tmp_path: Path, file: Path) -> None:
     proposal = propose([file], SHOULDER)
     assert not any("muscle_pressure" in text for text in proposal.logs[0].remarks)
-    (plain,) = read(tmp_path, propose([file.with_name("unit_barg.csv")], SHOULDER)).recordings
+    (plain,) = case_of(tmp_path, propose([file.with_name("unit_barg.csv")], SHOULDER)).recordings
     found, only = pressure(tmp_path, proposal)
     np.testing.assert_allclose(found, plain.channels["muscle_pressure"], rtol=1e-5)
     assert only.notes == {}
@@ -321,7 +300,7 @@ def test_a_tank_that_empties_becomes_a_case(tmp_path: Path) -> None:
         (match,) = proposal.logs[0].matches
         assert match.channel == "muscle_pressure"
         assert not any("likely" in text for text in proposal.logs[0].remarks)
-        found, _ = pressure_of(read(tmp_path, proposal, rig))
+        found, _ = pressure_of(case_of(tmp_path, proposal, rig))
         np.testing.assert_allclose(found, falling, atol=5.0)
 
 
@@ -330,17 +309,13 @@ def test_a_tank_that_empties_becomes_a_case(tmp_path: Path) -> None:
 
 def test_a_fluid_pressure_is_absolute_and_its_variance_no_channel(tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
-    with file.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        schema = writer.register_schema("sensor_msgs/msg/FluidPressure", "jsonschema", b"{}")
-        channel = writer.register_channel("/muscle", "json", schema)
-        for at, gauge in zip(TIME, GAUGE, strict=True):
-            stamp = {"sec": 1_700_000_000 + int(at), "nanosec": round(at % 1 * 1e9)}
-            body = {"header": {"stamp": stamp}, "fluid_pressure": gauge + STANDARD, "variance": 4.0}
-            nanos = 1_700_000_000 * 10**9 + round(at * 1e9)
-            writer.add_message(channel, nanos, json.dumps(body).encode(), nanos)
-        writer.finish()
+    sent = []
+    for at, gauge in zip(TIME, GAUGE, strict=True):
+        stamp = {"sec": 1_700_000_000 + int(at), "nanosec": round(at % 1 * 1e9)}
+        body = {"header": {"stamp": stamp}, "fluid_pressure": gauge + STANDARD, "variance": 4.0}
+        nanos = 1_700_000_000 * 10**9 + round(at * 1e9)
+        sent.append((nanos, nanos, body))
+    write_json_messages(file, "/muscle", sent, "sensor_msgs/msg/FluidPressure")
     for rig in (SHOULDER, load_rig(REGULATED), None):
         proposal = propose([file], rig)
         (match,) = proposal.logs[0].matches

@@ -7,14 +7,18 @@ import json
 import struct
 import warnings
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+import pamrs
+from pamrs.recordings import Case, Proposal, load_case
+
 Array = NDArray[np.float64]
+SHOULDER = pamrs.rigs.shoulder()
 N, DT = 400, 0.01
 UNITS = {"u": "V", "p1": "bar", "angle": "deg"}
 #: What goes into a case.toml for this log, whatever its format.
@@ -73,20 +77,11 @@ def write_labview(path: Path, data: dict[str, Array]) -> None:
     path.write_bytes(csv_text(data, "\t", ",", head).encode("cp1252"))
 
 
-def write_parquet(path: Path, data: dict[str, Array]) -> None:
+def write_frame(path: Path, data: dict[str, Array]) -> None:
+    """Parquet or Feather, by the ending."""
     import pandas as pd
 
-    pd.DataFrame(data).to_parquet(path)
-
-
-def write_feather(path: Path, data: dict[str, Array]) -> None:
-    import pandas as pd
-
-    pd.DataFrame(data).to_feather(path)
-
-
-def write_npz(path: Path, data: dict[str, Array]) -> None:
-    np.savez(path, **data)
+    getattr(pd.DataFrame(data), f"to_{path.suffix[1:]}")(path)
 
 
 def write_npy(path: Path, data: dict[str, Array]) -> None:
@@ -104,9 +99,8 @@ def write_with_time(path: Path, data: dict[str, Array]) -> None:
     import scipy.io
 
     listed = [{"values": data[name], "label": name, "dimensions": 1.0} for name in UNITS]
-    scipy.io.savemat(
-        path, {"scope": {"time": data["t"], "signals": listed, "blockName": "m/Scope"}}
-    )
+    scope = {"time": data["t"], "signals": listed, "blockName": "m/Scope"}
+    scipy.io.savemat(path, {"scope": scope})
 
 
 def write_controldesk(path: Path, data: dict[str, Array]) -> None:
@@ -186,23 +180,24 @@ def write_mf4(path: Path, data: dict[str, Array]) -> None:
 def write_tdms(path: Path, data: dict[str, Array]) -> None:
     from nptdms import ChannelObject, TdmsWriter
 
+    told = {
+        "wf_increment": DT,
+        "wf_start_offset": 0.0,
+        "wf_start_time": np.datetime64("2024-05-12T10:00:00"),
+    }
+    channels = [
+        ChannelObject("daq", name, data[name], properties=told | {"unit_string": unit})
+        for name, unit in UNITS.items()
+    ]
     with TdmsWriter(path) as writer:
-        writer.write_segment(
-            [
-                ChannelObject(
-                    "daq",
-                    name,
-                    data[name],
-                    properties={
-                        "wf_increment": DT,
-                        "wf_start_offset": 0.0,
-                        "wf_start_time": np.datetime64("2024-05-12T10:00:00"),
-                        "unit_string": unit,
-                    },
-                )
-                for name, unit in UNITS.items()
-            ]
-        )
+        writer.write_segment(channels)
+
+
+def messages(data: dict[str, Array]) -> Iterator[tuple[int, dict[str, float]]]:
+    """Nanoseconds and numbers of each row."""
+    for row, seconds in enumerate(data["t"]):
+        nanos = 1_715_500_000 * 10**9 + round(seconds * 1e9)
+        yield nanos, {name: float(data[name][row]) for name in UNITS}
 
 
 def write_bag(path: Path, data: dict[str, Array]) -> None:
@@ -217,10 +212,9 @@ def write_bag(path: Path, data: dict[str, Array]) -> None:
     empty = np.array([])
     with Writer(path, version=9) as writer:
         topic = writer.add_connection("/rig", joint.__msgtype__, typestore=store)
-        for row, seconds in enumerate(data["t"]):
-            nanos = 1_715_500_000 * 10**9 + round(seconds * 1e9)
+        for nanos, numbers in messages(data):
             head = header(stamp(nanos // 10**9, nanos % 10**9), "")
-            values = np.array([data[name][row] for name in UNITS])
+            values = np.array(list(numbers.values()))
             message = joint(head, list(UNITS), values, empty, empty)
             writer.write(topic, nanos, store.serialize_cdr(message, joint.__msgtype__))
 
@@ -231,25 +225,28 @@ def write_mcap(path: Path, data: dict[str, Array]) -> None:
     with path.open("wb") as stream:
         writer = Writer(stream)
         schema = writer.register_msgdef("rig/msg/State", "\n".join(f"float64 {n}" for n in UNITS))
-        for row, seconds in enumerate(data["t"]):
-            nanos = 1_715_500_000 * 10**9 + round(seconds * 1e9)
-            message = {name: float(data[name][row]) for name in UNITS}
-            writer.write_message("/rig", schema, message, log_time=nanos, publish_time=nanos)
+        for nanos, numbers in messages(data):
+            writer.write_message("/rig", schema, numbers, log_time=nanos, publish_time=nanos)
         writer.finish()
 
 
 def write_json_mcap(path: Path, data: dict[str, Array]) -> None:
+    write_json_messages(path, "/rig", ((at, at, numbers) for at, numbers in messages(data)))
+
+
+def write_json_messages(
+    path: Path, topic: str, sent: Iterable[tuple[int, int, Any]], kind: str = "State"
+) -> None:
+    """An MCAP file of messages in JSON: when each was logged and published [ns], and what it is."""
     from mcap.writer import Writer
 
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
-        schema = writer.register_schema("State", "jsonschema", b"{}")
-        channel = writer.register_channel("/rig", "json", schema)
-        for row, seconds in enumerate(data["t"]):
-            body = json.dumps({name: float(data[name][row]) for name in UNITS}).encode()
-            nanos = round(seconds * 1e9)
-            writer.add_message(channel, nanos, body, nanos)
+        schema = writer.register_schema(kind, "jsonschema", b"{}")
+        channel = writer.register_channel(topic, "json", schema)
+        for logged, published, body in sent:
+            writer.add_message(channel, logged, json.dumps(body).encode(), published)
         writer.finish()
 
 
@@ -280,21 +277,15 @@ def write_protobuf_mcap(path: Path, data: dict[str, Array]) -> None:
     pool.Add(file)
     kind = message_factory.GetMessageClass(pool.FindMessageTypeByName("rig.State"))
     with path.open("wb") as stream, Writer(stream) as writer:
-        for row, seconds in enumerate(data["t"]):
-            message = kind(**{name: float(data[name][row]) for name in UNITS}, spare=[1.0, 2.0])
-            nanos = 1_715_500_000 * 10**9 + round(seconds * 1e9)
+        for nanos, numbers in messages(data):
+            message = kind(**numbers, spare=[1.0, 2.0])
             message.stamp.seconds, message.stamp.nanos = divmod(nanos, 10**9)
             writer.write_message("/rig", message, log_time=nanos, publish_time=nanos)
 
 
 def _sheet(data: dict[str, Array]) -> list[list[Any]]:
-    head = ["t [s]", "u [V]", "p1 [bar]", "angle [deg]"]
-    return [
-        ["Stand 3", "12 May"],
-        [],
-        head,
-        *(list(row) for row in zip(*data.values(), strict=True)),
-    ]
+    above = [["Stand 3", "12 May"], [], ["t [s]", "u [V]", "p1 [bar]", "angle [deg]"]]
+    return [*above, *map(list, zip(*data.values(), strict=True))]
 
 
 def write_xlsx(path: Path, data: dict[str, Array]) -> None:
@@ -394,9 +385,9 @@ FORMATS: dict[str, tuple[str, Callable[[Path, dict[str, Array]], None], str, Any
     "utf16": ("run.txt", write_utf16, "{}", "t"),
     "gz": ("run.csv.gz", write_gz, "{}", "t"),
     "labview": ("run.lvm", write_labview, "{}", "t"),
-    "parquet": ("run.parquet", write_parquet, "{}", "t"),
-    "feather": ("run.feather", write_feather, "{}", "t"),
-    "npz": ("run.npz", write_npz, "{}", "t"),
+    "parquet": ("run.parquet", write_frame, "{}", "t"),
+    "feather": ("run.feather", write_frame, "{}", "t"),
+    "npz": ("run.npz", lambda path, data: np.savez(path, **data), "{}", "t"),
     "npy": ("run.npy", write_npy, "{}", "t"),
     "mat": ("run.mat", write_mat, "rig/{}", "rig/t"),
     "structure with time": ("run.mat", write_with_time, "scope/{}", None),
@@ -429,3 +420,26 @@ def written(folder: Path, kind: str, data: dict[str, Array] | None = None) -> tu
     name, write, pattern, time = FORMATS[kind]
     write(folder / name, signals() if data is None else data)
     return folder / name, pattern, time
+
+
+def write_table(file: Path, columns: Mapping[str, Sequence[object]], mark: str = ";") -> Path:
+    """A text of columns by their headings; numbers have seven digits."""
+    rows = ([f"{x:.7g}" if isinstance(x, float) else str(x) for x in row]
+            for row in zip(*columns.values(), strict=True))  # fmt: skip
+    file.write_text("\n".join(map(mark.join, [list(columns), *rows])) + "\n", encoding="utf-8")
+    return file
+
+
+def npz(folder: Path, **series: Any) -> Path:
+    """A file of arrays by their names."""
+    arrays = {name: np.asarray(values, dtype=float) for name, values in series.items()}
+    np.savez(folder / "run.npz", **arrays)
+    return folder / "run.npz"
+
+
+def case_of(home: Path, toml: str | Proposal, rig: pamrs.Rig = SHOULDER) -> Case:
+    """The case of a description, or of what is proposed for logs, with its rig beside it."""
+    rig.to_toml(home / "rig.toml")
+    text = toml if isinstance(toml, str) else toml.case_toml(home)
+    (home / "case.toml").write_text(text, encoding="utf-8")
+    return load_case(home, allow_outside=True)

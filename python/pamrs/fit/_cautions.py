@@ -101,14 +101,11 @@ def _moduli(found: Estimate, parameters: Parameters) -> list[str]:
             f"{unsure} of {len(moduli)} moduli are not told from zero: a lower order may predict "
             "as well, compare_models (--compare) ranks them"
         )
-    stiff = [
-        f"{item.name} = {item.value:.2g} Pa"
-        for item in moduli
-        if item.unit == "Pa" and abs(item.value) > _STIFF
-    ]
+    stiff = [item for item in moduli if item.unit == "Pa" and abs(item.value) > _STIFF]
     if stiff:
+        named = ", ".join(f"{item.name} = {item.value:.2g} Pa" for item in stiff)
         notes.append(
-            f"{', '.join(stiff)}: beyond 1 GPa, no rubber is that stiff; take a lower order, or "
+            f"{named}: beyond 1 GPa, no rubber is that stiff; take a lower order, or "
             "check the units"
         )
     return notes
@@ -116,9 +113,9 @@ def _moduli(found: Estimate, parameters: Parameters) -> list[str]:
 
 def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list[str]:
     """Free geometry that the points do not tell, or that went far from where it was known to be."""
-    notes = (
-        [] if found.success else [f"the search of the geometry did not converge: {found.message}"]
-    )
+    notes = []
+    if not found.success:
+        notes.append(f"the search of the geometry did not converge: {found.message}")
     for free in problem.free:
         item = parameters[free.name]
         place = with_unit(f"{free.name} = {item.value:.4g}", item.unit)
@@ -156,9 +153,8 @@ def _points(problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str]
         for i, error in apart
     )
     which = "it" if len(apart) == 1 else "them"
-    return [
-        f"{words}: further from the other points than {_APART:g} times their scatter; check {which}"
-    ]
+    apart_by = f"{_APART:g} times their scatter"
+    return [f"{words}: further from the other points than {apart_by}; check {which}"]
 
 
 def outlying(problem: Problem, found: Estimate, rows: Mask) -> list[tuple[int, float]]:
@@ -215,9 +211,8 @@ def _scatter(scaled: Array, told: Mask, level: Index) -> Array:
     for group in np.unique(level):
         own = told & (level == group)
         if np.sum(own) >= _FEW_SPARE:
-            spread[level == group] = np.maximum(
-                spread[level == group], _MAD * float(np.median(np.abs(scaled[own])))
-            )
+            least = _MAD * float(np.median(np.abs(scaled[own])))
+            spread[level == group] = np.maximum(spread[level == group], least)
     return spread
 
 
@@ -242,9 +237,8 @@ def _loops(problem: Problem, found: Estimate, rows: Mask) -> list[str]:
     side, residual = way * np.abs(force), found.residual / problem.weight[rows]
     share = float(side @ residual) / float(side @ side)
     rest = residual - share * side
-    if abs(share) <= _LOOP * math.sqrt(
-        float(rest @ rest) / (max(len(rest) - 1, 1) * float(side @ side))
-    ):
+    variance = float(rest @ rest) / (max(len(rest) - 1, 1) * float(side @ side))
+    if abs(share) <= _LOOP * math.sqrt(variance):
         return []
     if share < 0.0:
         return [

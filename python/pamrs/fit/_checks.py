@@ -128,9 +128,9 @@ def check_units(
     slips = _slips("length", factor / _LONGEST[1], factor / _LONGEST[0], units)
     if slips:
         times = slips[0][2]
-        wrong = (
-            f"{times:.4g} times too small" if times > 1.0 else f"{1.0 / times:.4g} times too large"
-        )
+        wrong = f"{times:.4g} times too small"
+        if times <= 1.0:
+            wrong = f"{1.0 / times:.4g} times too large"
         advice = f"Either rest_length is {wrong}, or the length column is {_words(slips)}"
     else:
         advice = (
@@ -179,11 +179,9 @@ def check_forces(label: str, largest: float, able: float, units: Mapping[str, st
 
     forces = blame("force", "large" if high else "small", *factors)
     pressures = blame("pressure", "small" if high else "large", 1.0 / factors[1], 1.0 / factors[0])
-    found = (
-        f"force up to {largest:.4g} N, but the gas could pull {able:.4g} N at most"
-        if high
-        else f"force up to {largest:.4g} N only, where the gas could pull {able:.4g} N"
-    )
+    found = f"force up to {largest:.4g} N only, where the gas could pull {able:.4g} N"
+    if high:
+        found = f"force up to {largest:.4g} N, but the gas could pull {able:.4g} N at most"
     raise RecordingError(
         f"{label}: {found}: wrong unit or wrong muscle? Either {forces}, or {pressures}, "
         f"or the muscle's sizes are too {'small' if high else 'large'}"

@@ -90,38 +90,24 @@ class ModelComparison:
         """The comparison as a table; errors in percent of the largest force."""
         head = (
             f"{'rank':>4}  {'model':15} {'M':>2} {'k':>3} {'rms':>6} {'max':>6} | {'LOPO rms':>8} "
-            f"{'max':>6} {'ends':>6}"
-        )
-        head += f" | {'AICc':>7} {'BIC':>7}" + (
-            f" | {'subset':>7} {'max':>6}" if self.subset else ""
+            f"{'max':>6} {'ends':>6} | {'AICc':>7} {'BIC':>7}"
         )
         lines = [
-            (
-                f"{self.ndata} points, effectively {self.effective_size:.3g} independent, the "
-                "number that AICc and BIC here count"
-            ),
+            f"{self.ndata} points, effectively {self.effective_size:.3g} independent, the number "
+            "that AICc and BIC here count",
             "errors in % of the map's largest force; k unknowns",
-            *(
-                [
-                    "subset: fitted to "
-                    + ", ".join(f"{p / 1e3:g}" for p in self.subset)
-                    + " kPa, error on the other levels"
-                ]
-                if self.subset
-                else []
-            ),
-            head,
         ]
-        lines += [self._line(row) for row in self.rows]
+        if self.subset:
+            levels = ", ".join(f"{p / 1e3:g}" for p in self.subset)
+            lines.append(f"subset: fitted to {levels} kPa, error on the other levels")
+            head += f" | {'subset':>7} {'max':>6}"
         lines += [
-            (
-                "* fewest unknowns among those that predict pressures left out (LOPO) no worse "
-                "than rank 1:"
-            ),
-            (
-                "  the excess of their squared errors, level by level, is within one standard "
-                f"error, their rms within {_NEAR:g} times"
-            ),
+            head,
+            *map(self._line, self.rows),
+            "* fewest unknowns among those that predict pressures left out (LOPO) no worse than "
+            "rank 1:",
+            "  the excess of their squared errors, level by level, is within one standard error, "
+            f"their rms within {_NEAR:g} times",
         ]
         lines += [f"note: {note}" for note in self.notes]
         return "\n".join(lines) + "\n"
@@ -137,22 +123,18 @@ class ModelComparison:
         start = f"{place:>4}  {row['model']:15} {row['order'] or '':>2} {row['nvarys']:3d} "
         if row["rank"] is None:
             return start + f"not ranked: {row['reason']}"
-        line = start + (
-            f"{share('rms', 6)} {share('max', 6)} | {share('lopo_rms', 8)} "
-            f"{share('lopo_max', 6)} {share('lopo_end_rms', 6)}"
+        line = (
+            f"{start}{share('rms', 6)} {share('max', 6)} | {share('lopo_rms', 8)} "
+            f"{share('lopo_max', 6)} {share('lopo_end_rms', 6)} | {number('aicc')} {number('bic')}"
         )
-        line += f" | {number('aicc')} {number('bic')}"
-        return line + (
-            f" | {share('subset_rms', 7)} {share('subset_max', 6)}" if self.subset else ""
-        )
+        subset = f" | {share('subset_rms', 7)} {share('subset_max', 6)}" if self.subset else ""
+        return line + subset
 
     def __repr__(self) -> str:
         ranked = sum(row["rank"] is not None for row in self.rows)
         first = self.rows[0]
-        return (
-            f"ModelComparison({ranked} of {len(self.rows)} ranked, best {first['model']} "
-            f"{first['order'] or ''})"
-        )
+        best = f"{first['model']} {first['order'] or ''}"
+        return f"ModelComparison({ranked} of {len(self.rows)} ranked, best {best})"
 
 
 def compare_models(
@@ -227,9 +209,7 @@ def compare_models(
         for order in (wanted if name in POLYNOMIAL_MODELS else [None])
     ]
     if not pairs:
-        raise ParameterError(
-            "orders is empty: the models with a stress polynomial need one order at least"
-        )
+        raise ParameterError("orders is empty: models with a stress polynomial need one at least")
     rows: list[dict[str, Any]] = []
     fits: dict[tuple[str, int | None], MuscleFit] = {}
     names = tuple(free)
@@ -281,12 +261,8 @@ def _ranked(
         row["lopo_excess"], row["lopo_excess_stderr"] = _paired(_level_squares(fit) - least)
     # a candidate that fails at one level only has an excess of one standard error, however large
     near = _NEAR * ranked[0]["lopo_rms"]
-    eligible = [
-        row
-        for row in ranked
-        if row["lopo_excess"] <= row["lopo_excess_stderr"] and row["lopo_rms"] <= near
-    ]
-    recommend(eligible)["recommended"] = True
+    eligible = [r for r in ranked if r["lopo_excess"] <= r["lopo_excess_stderr"]]
+    recommend([r for r in eligible if r["lopo_rms"] <= near])["recommended"] = True
     return ranked, size
 
 
@@ -326,10 +302,8 @@ def _level_squares(fit: MuscleFit) -> Array:
     """Sum of squared leave-one-pressure-out errors of each level, in squares of the map's largest
     force.
     """
-    return (
-        fit.leave_one_pressure_out().level_squares()
-        / float(fit.data.force[fit.data.used].max()) ** 2
-    )
+    top = float(fit.data.force[fit.data.used].max())
+    return fit.leave_one_pressure_out().level_squares() / top**2
 
 
 def _paired(difference: Array) -> tuple[float, float]:
@@ -341,18 +315,14 @@ def _candidate(
     data: ForceMap, muscle: Muscle, settings: dict[str, Any], levels: Sequence[float] | None
 ) -> tuple[dict[str, Any], MuscleFit | None]:
     """One row of the table, and the fit of all levels where there is one."""
-    row = {
-        "model": settings["model"],
-        "order": settings["order"],
-        "nvarys": _unknowns(settings),
-        "recommended": False,
-        **dict.fromkeys(_COLUMNS),
-    }
+    row = {name: settings[name] for name in ("model", "order")} | dict.fromkeys(_COLUMNS)
+    row |= {"nvarys": _unknowns(settings), "recommended": False}
     try:
         fit = fit_muscle(data, muscle, **settings)
         cross = fit.leave_one_pressure_out()
     except FitError as reason:
         return row | {"reason": str(reason)}, None
+    moved = [abs(free.moved(fit.params[free.name].value)) for free in fit.free]
     row |= {
         "condition_number": fit.condition_number,
         "rms": fit.rms_error,
@@ -362,9 +332,7 @@ def _candidate(
         "lopo_stderr": cross.rms_stderr,
         "lopo_interior_rms": cross.interior_rms,
         "lopo_end_rms": cross.end_rms,
-        "moved": max(
-            (abs(free.moved(fit.params[free.name].value)) for free in fit.free), default=0.0
-        ),
+        "moved": max(moved, default=0.0),
     }
     if levels is not None:
         try:
@@ -381,10 +349,10 @@ def _candidate(
 
 
 def _unknowns(settings: Mapping[str, Any]) -> int:
-    name = settings["model"]
-    return len(settings["free"]) + (
-        2 * settings["order"] if name in POLYNOMIAL_MODELS else len(CONSTANTS[name])
-    )
+    name, count = settings["model"], len(settings["free"])
+    if name in POLYNOMIAL_MODELS:
+        return count + int(2 * settings["order"])
+    return count + len(CONSTANTS[name])
 
 
 def effective_size(fit: MuscleFit) -> float:

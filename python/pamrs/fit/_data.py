@@ -169,17 +169,12 @@ class ForceMap:
             If ``rest_length`` or ``level_tolerance`` is not possible.
         """
         label = name or source or "force map"
-        columns = {
-            "length": _column(length),
-            "pressure": _column(pressure),
-            "force": _column(force),
-        }
-        sizes = [len(values) for values in columns.values()]
+        long, gas, pull = columns = [_column(values) for values in (length, pressure, force)]
+        sizes = [len(values) for values in columns]
         if len(set(sizes)) != 1:
             raise RecordingError(
                 f"{label}: length, pressure and force have {sizes} rows; the same number is needed"
             )
-        long, gas, pull = columns.values()
         rest = _rest_length(rest_length)
         if level_tolerance is not None:
             positive("level_tolerance", level_tolerance)
@@ -234,9 +229,8 @@ class ForceMap:
         if not drop.any():
             return self
         used = self.used & ~drop
-        reason = tuple(
-            why if gone else old for gone, old in zip(drop.tolist(), self.reason, strict=True)
-        )
+        pairs = zip(drop.tolist(), self.reason, strict=True)
+        reason = tuple(why if gone else old for gone, old in pairs)
         kept = np.unique(self.level[used])
         level = np.where(used, np.searchsorted(kept, self.level), -1)
         map_ = replace(self, used=used, reason=reason, level=level, levels=self.levels[kept])
@@ -300,11 +294,9 @@ class ForceMap:
 
     def _places(self, rows: Sequence[int]) -> str:
         """The first of some rows, by their number in the file or else by their index."""
-        one, several, numbers = (
-            ("index", "indices", rows)
-            if self.row_numbers is None
-            else ("row", "rows", self.row_numbers[rows])
-        )
+        one, several, numbers = "index", "indices", np.asarray(rows)
+        if self.row_numbers is not None:
+            one, several, numbers = "row", "rows", self.row_numbers[rows]
         shown = ", ".join(str(number) for number in numbers[:_SHOWN])
         more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
         return f"{one if len(rows) == 1 else several} {shown}{more}"
@@ -327,13 +319,8 @@ class ForceMap:
         arrays.
         """
         rows = self.used
-        return (
-            self.pressure[rows],
-            self.contraction[rows],
-            self.force[rows],
-            self.level[rows],
-            self.direction[rows],
-        )
+        columns = self.pressure[rows], self.contraction[rows], self.force[rows]
+        return *columns, self.level[rows], self.direction[rows]
 
     # --------------------------------------------------------------- narrowing
 
@@ -450,9 +437,8 @@ class ForceMap:
         check_forces(self.label, float(np.quantile(pull, _MOST)), able, self.units)
         if able <= 0.0:  # no pressure, or no pull of the gas: nothing to judge by
             return map_
-        return map_._without(
-            map_.used & (np.abs(self.force) > FORCE_HIGH * able), "force out of range"
-        )
+        beyond = map_.used & (np.abs(self.force) > FORCE_HIGH * able)
+        return map_._without(beyond, "force out of range")
 
 
 # ------------------------------------------------------------------------- checks
@@ -530,9 +516,7 @@ def _duplicates(*columns: Array) -> Mask:
     """Rows that repeat an earlier row in every column."""
     rows = np.column_stack(columns)
     _, first = np.unique(rows, axis=0, return_index=True)
-    repeated = np.ones(len(rows), dtype=bool)
-    repeated[first] = False
-    return repeated
+    return ~np.isin(np.arange(len(rows)), first)
 
 
 def _cluster(pressure: Array, tolerance: float | None) -> tuple[Index, Array, list[str]]:
@@ -543,16 +527,12 @@ def _cluster(pressure: Array, tolerance: float | None) -> tuple[Index, Array, li
     """
 
     def width(at: float) -> float:
-        return (
-            tolerance if tolerance is not None else max(_LEVEL_ABSOLUTE, _LEVEL_RELATIVE * abs(at))
-        )
+        return tolerance or max(_LEVEL_ABSOLUTE, _LEVEL_RELATIVE * abs(at))
 
     order = np.argsort(pressure, kind="stable")
     ranked = pressure[order].tolist()
-    starts = [
-        0,
-        *(i for i in range(1, len(ranked)) if ranked[i] - ranked[i - 1] > width(ranked[i - 1])),
-    ]
+    gaps = (i for i in range(1, len(ranked)) if ranked[i] - ranked[i - 1] > width(ranked[i - 1]))
+    starts = [0, *gaps]
     edges: list[int] = []
     note: list[str] = []
     for start, stop in zip(starts, [*starts[1:], len(ranked)], strict=True):

@@ -15,6 +15,7 @@ from pamrs.rig.muscle_models import models_with
 
 SCHEMA: Final = "pamrs.force_map/1"
 _ENTRY: Final = {"anyOf": [TEXT, {"type": "object"}]}
+_LIST: Final = {"type": "array", "items": _ENTRY}
 _CELL: Final = {"anyOf": [TEXT, NUMBER, BOOLEAN]}
 _TOP: Final = {
     "schema": Rule({"const": SCHEMA}, repr(SCHEMA)),
@@ -22,12 +23,7 @@ _TOP: Final = {
         ("name", "description", "source", "file", "delimiter", "decimal"), Rule(TEXT, "a text")
     ),
     "columns": Rule(
-        {
-            "anyOf": [
-                {"type": "object", "additionalProperties": _ENTRY},
-                {"type": "array", "items": _ENTRY},
-            ]
-        },
+        {"anyOf": [{"type": "object", "additionalProperties": _ENTRY}, _LIST]},
         "a table of texts, or a list of one for each column",
     ),
     "where": Rule({"type": "object", "additionalProperties": _CELL}, "a table of texts"),
@@ -106,9 +102,7 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
         if not reader.problems:
             reader.problems += muscle_problems("muscle", model)
     else:
-        reader.problem(
-            "the block [muscle] is missing: the geometry of the muscle, as in a rig file"
-        )
+        reader.problem("the block [muscle] is missing: the muscle's geometry, as in a rig file")
     if reader.problems:
         raise RecordingError(joined(str(file), reader.problems))
     texts = {key: document.get(key, "") for key, rule in _TOP.items() if rule.schema == TEXT}
@@ -143,14 +137,9 @@ def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:
     """A ``[muscle]`` block with zeros where it leaves out the moduli of its model, which a fit is
     to find.
     """
-    return {
-        **{
-            key: value
-            for key, value in _ZEROS.items()
-            if str(block.get("model", "robinson")) in models_with(key)
-        },
-        **block,
-    }
+    model = str(block.get("model", "robinson"))
+    zeros = {key: value for key, value in _ZEROS.items() if model in models_with(key)}
+    return {**zeros, **block}
 
 
 def _quantity(reader: Reader, document: Mapping[str, Any], key: str, unit: str) -> float | None:
@@ -158,11 +147,8 @@ def _quantity(reader: Reader, document: Mapping[str, Any], key: str, unit: str) 
     raw = document.get(key)
     if raw is None:
         return None
-    if (
-        not isinstance(raw, Mapping)
-        or set(raw) != {"value", "unit"}
-        or not isinstance(raw["unit"], str)
-    ):
+    whole = isinstance(raw, Mapping) and set(raw) == {"value", "unit"}
+    if not (whole and isinstance(raw["unit"], str)):
         reader.problem(f"{key} = {raw!r} is not allowed: write {{ value = ..., unit = {unit!r} }}")
         return None
     return reader.scalar(key, unit, raw["value"], raw["unit"], -1e9, 1e9)

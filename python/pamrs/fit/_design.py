@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import one_of, refused
+from pamrs._checks import one_of, refused, whole
 from pamrs.errors import FitError
 from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODELS
 
@@ -66,13 +66,8 @@ def template(muscle: Muscle, model: str | None, geometry: str | None, order: int
         given = muscle.parameters
         own = max(len(given["modulus_slope"]), len(given["modulus_offset"]))
         terms = (own or _DEFAULT_ORDER) if order is None else order
-        if (
-            isinstance(terms, bool)
-            or not isinstance(terms, (int, np.integer))
-            or not 1 <= terms <= _LARGEST_ORDER
-        ):
-            raise refused("order", order, f"a whole number from 1 to {_LARGEST_ORDER}")
-        changes |= {"modulus_slope": [0.0] * int(terms), "modulus_offset": [0.0] * int(terms)}
+        moduli = [0.0] * whole("order", terms, 1, _LARGEST_ORDER)
+        changes |= {"modulus_slope": moduli, "modulus_offset": moduli}
     elif order is not None:
         raise refused("order", order, f"the model {name} has no stress polynomial; leave order out")
     else:
@@ -119,9 +114,8 @@ class Design:
         each level.
         """
         if self.per_level:
-            return tuple(
-                f"{name}_{level}" for level in _level_names(self.knots) for name in self.base
-            )
+            levels = _level_names(self.knots)
+            return tuple(f"{name}_{level}" for level in levels for name in self.base)
         if self.polynomial:
             return tuple(f"{letter}{name[1:]}" for letter in "mb" for name in self.base)
         return self.base
@@ -131,27 +125,23 @@ class Design:
         """What each coefficient is a sum of: parameter of the muscle, place in it, factor;
         ``("modulus_slope", 0, 1.0)`` for ``m1``.
         """
-        places = range(len(self.base))
-        if self.polynomial and self.per_level:
-            pressures = self.knots.tolist()
-            return tuple(
-                (("modulus_slope", k, p), ("modulus_offset", k, 1.0))
-                for p in pressures
-                for k in places
-            )
-        if self.polynomial:
-            return tuple(
-                ((kind, k, 1.0),) for kind in ("modulus_slope", "modulus_offset") for k in places
-            )
-        groups = len(self.knots) if self.per_level else 1
-        return tuple(((name, 0, 1.0),) for _ in range(groups) for name in self.base)
+        kinds, places = ("modulus_slope", "modulus_offset"), range(len(self.base))
+        if not self.polynomial:
+            groups = len(self.knots) if self.per_level else 1
+            return tuple(((name, 0, 1.0),) for name in groups * self.base)
+        if not self.per_level:
+            return tuple(((kind, k, 1.0),) for kind in kinds for k in places)
+        return tuple(
+            tuple((kind, k, factor) for kind, factor in zip(kinds, (p, 1.0), strict=True))
+            for p in self.knots.tolist()
+            for k in places
+        )
 
     @property
     def units(self) -> tuple[str, ...]:
         """SI units of the coefficients."""
-        return tuple(
-            "1" if self.polynomial and name.startswith("m") else "Pa" for name in self.names
-        )
+        slopes = "m" if self.polynomial else ()
+        return tuple("1" if name[0] in slopes else "Pa" for name in self.names)
 
     def weights(self, pressure: Array) -> Array:
         """``w_j(P)``, shape ``(n, j)``; beyond the outer levels the hat functions continue as
@@ -222,9 +212,8 @@ def _parts(
         still = muscle.without_friction()
         way = np.where(direction == 0, -1.0, direction)
         gas = still.force(pressure, contraction, direction=way)
-        loaded = still.replace(bladder_modulus=_UNIT_MODULUS).force(
-            pressure, contraction, direction=way
-        )
+        stiff = still.replace(bladder_modulus=_UNIT_MODULUS)
+        loaded = stiff.force(pressure, contraction, direction=way)
         return gas, ((loaded - gas) / _UNIT_MODULUS)[:, None]
     # A map repeats its lengths at every level, and the braid solve is what costs.
     distinct, at = np.unique(contraction, return_inverse=True)

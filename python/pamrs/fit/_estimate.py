@@ -98,19 +98,16 @@ class Problem:
 
     def muscle(self, values: Array) -> Muscle:
         """The template with other geometry values."""
-        if self.free:
-            return self.blank.replace(
-                **{free.name: float(v) for free, v in zip(self.free, values, strict=True)}
-            )
-        return self.blank
+        pairs = zip(self.free, values, strict=True)
+        moved = {free.name: float(value) for free, value in pairs}
+        return self.blank.replace(**moved) if moved else self.blank
 
     def system(self, design: Design, muscle: Muscle, rows: Mask) -> tuple[Array, Array]:
         """Weighted design matrix (n, k) and target (n,) of some rows for one geometry."""
         contraction = 1.0 - self.length[rows] / muscle.parameters["rest_length"]
         pressure, direction, force = self.pressure[rows], self.direction[rows], self.force[rows]
-        gas, columns = design.columns(
-            muscle, pressure, contraction, direction, design.weights(self.knot(rows))
-        )
+        weights = design.weights(self.knot(rows))
+        gas, columns = design.columns(muscle, pressure, contraction, direction, weights)
         factor = friction_factor(muscle, pressure, direction, force)
         weight = self.weight[rows]
         return columns * (factor * weight)[:, None], (force - factor * gas) * weight
@@ -154,12 +151,12 @@ class Problem:
         longest, shortest = rest * (1.0 - low), rest * (1.0 - high)
         outside = int(np.sum((self.length > longest) | (self.length < shortest)))
         if outside:
+            angle = math.degrees(muscle.parameters["braid_angle"])
             raise FitError(
                 f"{outside} of {len(self.length)} points have lengths that this geometry cannot "
                 f"reach: the braid allows {shortest:.4g} to {longest:.4g} m, the points span "
                 f"{self.length.min():.4g} to {self.length.max():.4g} m; check rest_length = "
-                f"{rest:g} m and braid_angle = "
-                f"{math.degrees(muscle.parameters['braid_angle']):.4g} deg, or flag the rows with "
+                f"{rest:g} m and braid_angle = {angle:.4g} deg, or flag the rows with "
                 "data.checked_against(muscle)"
             )
 
@@ -249,29 +246,20 @@ def _check_counts(problem: Problem, design: Design, rows: Mask) -> None:
     told = int(np.count_nonzero(problem.expected(design)[1]))
     # A tolerance is an equation of its own, but what it weighs against the data must come from
     # points to spare.
-    extra = (
-        sum(math.isinf(free.tolerance) for free in problem.free)
-        if problem.noise is not None
-        else len(problem.free)
-    )
+    extra = len(problem.free)
+    if problem.noise is not None:
+        extra = sum(math.isinf(free.tolerance) for free in problem.free)
     terms = len(design.base)
     what = f"order {terms}" if design.polynomial else f"the model {problem.blank.model}"
-    unknowns = [
-        *(design.names if k <= 8 else (*design.names[:3], "...", design.names[-1])),
-        *(free.name for free in problem.free),
-    ]
+    listed = design.names if k <= 8 else (*design.names[:3], "...", design.names[-1])
+    unknowns = [*listed, *(free.name for free in problem.free)]
     if design.per_level and told < k:
-        counts = {
-            int(level): int(np.sum(rows & (problem.level == level)))
-            for level in np.unique(problem.level[rows])
-        }
-        short = [
-            f"{problem.levels[level] / 1e3:g} kPa ({count})"
-            for level, count in counts.items()
-            if count < terms
-        ]
-        if short:
-            enough = [level for level, count in counts.items() if count >= terms]
+        counts = np.bincount(problem.level[rows], minlength=len(problem.levels))
+        present = np.flatnonzero(counts).tolist()
+        enough = [i for i in present if counts[i] >= terms]
+        if len(enough) < len(present):
+            few = [i for i in present if i not in enough]
+            short = [f"{problem.levels[i] / 1e3:g} kPa ({counts[i]})" for i in few]
             raise FitError(
                 f"moduli free at each level need {terms} points at every level for {what}; fewer "
                 f"at {', '.join(short)}. Levels with enough: {enough or 'none'}"
@@ -330,17 +318,9 @@ def _at(
     freedom = max(len(target) - len(found.x) - len(values), 1)
     plain = math.sqrt(float(residual @ residual) / freedom)
     noise = problem.noise if problem.noise is not None else (sigma or plain)
+    jacobian, condition = np.hstack([matrix, slopes]), found.condition_number
     return Estimate(
-        design,
-        blank,
-        found.x,
-        values,
-        residual,
-        np.hstack([matrix, slopes]),
-        noise,
-        found.condition_number,
-        message,
-        success,
+        design, blank, found.x, values, residual, jacobian, noise, condition, message, success
     )
 
 
@@ -392,11 +372,9 @@ def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None
     from scipy.optimize import least_squares
 
     space = _Geometry(problem, design, rows)
-    z = (
-        np.zeros(len(space.nominal))
-        if start is None
-        else (start.geometry - space.nominal) / space.scale
-    )
+    z = np.zeros(len(space.nominal))
+    if start is not None:
+        z = (start.geometry - space.nominal) / space.scale
     sigma = problem.noise or (start.sigma if start else space.scatter(z))
     found = None
     settled = problem.noise is not None
@@ -505,9 +483,8 @@ def _check_identified(problem: Problem, result: Estimate) -> None:
     priors = np.diag(result.sigma * problem.information(result.design))
     loose = [free.name for free in problem.free if math.isinf(free.tolerance)]
     stacked = np.vstack([result.jacobian, priors])
-    hint = "; take a lower order, or free less geometry"
-    if loose:
-        hint = f"; give a tolerance for {', '.join(loose)}"
+    advice = f"give a tolerance for {', '.join(loose)}" if loose else ""
+    hint = f"; {advice or 'take a lower order, or free less geometry'}"
     _, _, s, _ = decompose(stacked, names, hint)
     if loose and s[-1] < 1e-7 * s[0]:  # differences carry no more digits
         raise FitError(

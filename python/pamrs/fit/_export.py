@@ -30,16 +30,13 @@ def fit_report(fit: MuscleFit) -> str:
     law = "linear in pressure" if fit.moduli_kind == "linear" else "free at each level"
     moduli = f", moduli {law}" if fit.nvarys else ""
     rms, worst = fit.errors_of("fitted") or (0.0, 0.0)
+    top = "of the map's largest force"
     lines = [
         f"{fit.data.label}: {fit.model}{order}{moduli}",
-        (
-            f"  points fitted {fit.ndata} of {len(fit.data.used)} rows, {fit.nvarys} unknowns, "
-            f"condition number {fit.condition_number:.3g}"
-        ),
-        (
-            f"  force error, of the map's largest force: rms {100 * rms:.2f} %, max "
-            f"{100 * worst:.2f} %; R2 {fit.rsquared:.5f}"
-        ),
+        f"  points fitted {fit.ndata} of {len(fit.data.used)} rows, {fit.nvarys} unknowns, "
+        f"condition number {fit.condition_number:.3g}",
+        f"  force error, {top}: rms {100 * rms:.2f} %, max {100 * worst:.2f} %; R2 "
+        f"{fit.rsquared:.5f}",
     ]
     held_out = fit.errors_of("held_out")
     if held_out is not None:
@@ -48,31 +45,27 @@ def fit_report(fit: MuscleFit) -> str:
             f"{100 * held_out[1]:.2f} %"
         )
     aicc = "none" if fit.aicc is None else f"{fit.aicc:.1f}"
-    lines.append(f"  {_scatter(fit)}")
-    lines.append(
+    lines += [
+        f"  {_scatter(fit)}",
         f"  with all {fit.ndata} points as independent: AIC {fit.aic:.1f}, AICc {aicc}, BIC "
-        f"{fit.bic:.1f}"
-    )
+        f"{fit.bic:.1f}",
+    ]
     if fit.params:
         kind = "by level" if fit.errors == "level" else "plain"
         lines += ["", f"  {'':18} {'value':>12} {'std error':>11}  unit   (standard errors {kind})"]
     for item in fit.params.values():
         nominal = "" if item.init_value is None else f"   nominal {item.init_value:.5g}"
         known = "" if item.tolerance is None else f" +- {item.tolerance:.2g}"
-        lines.append(
-            with_unit(f"  {item.name:18} {item.value:12.5g} {item.stderr:11.2g} ", item.unit)
-            + nominal
-            + known
-        )
+        number = f"  {item.name:18} {item.value:12.5g} {item.stderr:11.2g} "
+        lines.append(with_unit(number, item.unit) + nominal + known)
     errors = fit.error_by_pressure()
     lines += [
         "",
         "  force error of each level, of the largest force of that level:",
         "  level [kPa]  points       rms [%]       max [%]",
     ]
-    for level, points, mean, largest, fitted in zip(
-        errors.levels, errors.points, errors.rms, errors.max, errors.fitted, strict=True
-    ):
+    columns = (errors.levels, errors.points, errors.rms, errors.max, errors.fitted)
+    for level, points, mean, largest, fitted in zip(*columns, strict=True):
         mark = "" if fitted else "  not fitted"
         lines.append(
             f"  {level / 1e3:11.5g} {points:7d} {100 * mean:13.2f} {100 * largest:13.2f}{mark}"
@@ -89,15 +82,11 @@ def _scatter(fit: MuscleFit) -> str:
     text = f"chi2 {fit.chisqr:.4g}{unit}, residual rms {rms:.4g} N"
     if fit.stated_noise is None:
         return text
-    shown = (
-        f"{fit.stated_noise:.4g} N"
-        if fit.weights == "force"
-        else f"{100 * fit.stated_noise:.3g} % of the level's largest force"
-    )
-    return (
-        f"{text}, reduced chi2 {fit.redchi / fit.stated_noise**2:.4g} with the stated noise of "
-        f"{shown}"
-    )
+    shown = f"{fit.stated_noise:.4g} N"
+    if fit.weights != "force":
+        shown = f"{100 * fit.stated_noise:.3g} % of the level's largest force"
+    reduced = f"reduced chi2 {fit.redchi / fit.stated_noise**2:.4g}"
+    return f"{text}, {reduced} with the stated noise of {shown}"
 
 
 def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:

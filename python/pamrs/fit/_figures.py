@@ -124,17 +124,14 @@ def _dots(axes: Axes, x: Any, y: Any, edge: Any, face: Any, **style: Any) -> Non
 
 def _draw_unused(axes: Axes, data: ForceMap, contraction: Array, size: float) -> None:
     """Crosses at the rows that are not used, as far as they are near the others."""
-    off = thinned(
-        np.flatnonzero((data.level < 0) & np.isfinite(contraction) & np.isfinite(data.force))
-    )
+    finite = np.isfinite(contraction) & np.isfinite(data.force)
+    off = thinned(np.flatnonzero((data.level < 0) & finite))
     used = contraction[data.used]
     low, high = float(used.min()), float(used.max())
     inside = off[(contraction[off] >= low - 20) & (contraction[off] <= high + 20)]
     if len(inside):
-        axes.scatter(
-            contraction[inside], data.force[inside],
-            marker="x", s=0.55 * size, color=_QUIET, lw=0.8, label="not used",
-        )  # fmt: skip
+        style: dict[str, Any] = {"marker": "x", "s": 0.55 * size, "color": _QUIET, "lw": 0.8}
+        axes.scatter(contraction[inside], data.force[inside], label="not used", **style)
 
 
 def _draw_model(
@@ -221,9 +218,8 @@ def _span(line: _Curve | None, points: _Curve | None) -> tuple[float, float]:
     if points is not None:
         known = points[2] <= 2 * float(np.median(points[2]))
         if line is not None:
-            known = np.abs(points[1] - np.interp(points[0], line[0], line[1])) <= 2 * float(
-                np.ptp(np.concatenate(values))
-            )
+            off = np.abs(points[1] - np.interp(points[0], line[0], line[1]))
+            known = off <= 2 * float(np.ptp(np.concatenate(values)))
         values.append(points[1][known])
     everything = np.concatenate(values) / 1e6
     low, high = float(everything.min()), float(everything.max())
@@ -257,9 +253,8 @@ def moduli_svg(
     columns = min(len(names), 4)
     rows = math.ceil(len(names) / columns)
     with mpl.rc_context(STYLE):
-        figure = Figure(
-            figsize=(10.0 if columns > 1 else 5.6, 2.9 * rows + 0.3), layout="constrained"
-        )
+        size = (10.0 if columns > 1 else 5.6, 2.9 * rows + 0.3)
+        figure = Figure(figsize=size, layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
         for panel, name in zip(panels, names, strict=False):
             _draw_modulus(panel, lines.get(name), points.get(name))
@@ -293,9 +288,8 @@ def _draw_modulus(axes: Axes, line: _Curve | None, points: _Curve | None) -> Non
         outside = int(np.sum((mpa < low) | (mpa > high)))
         if outside:
             text = f"{outside} level{'s' if outside > 1 else ''} off the scale"
-            axes.text(
-                0.98, 0.03, text, transform=axes.transAxes, ha="right", fontsize="small", color=_INK
-            )
+            place: dict[str, Any] = {"transform": axes.transAxes, "ha": "right"}
+            axes.text(0.98, 0.03, text, fontsize="small", color=_INK, **place)
     axes.axhline(0.0, color="#6b7280", lw=0.7)
     axes.set_ylim(low, high)
 
@@ -307,9 +301,8 @@ def _draw_errors(axes: Axes, curves: Sequence[ErrorCurve], *, left: bool) -> Non
     """Error (2.37) of each model over pressure; ``left`` draws the predicted levels instead of the
     fitted ones.
     """
-    drawn = [
-        100 * np.maximum(curve.left_rms if left else curve.rms, _LEAST_ERROR) for curve in curves
-    ]
+    shares = [curve.left_rms if left else curve.rms for curve in curves]
+    drawn = [100 * np.maximum(share, _LEAST_ERROR) for share in shares]
     values = np.concatenate([np.ones(0), *drawn])
     if values.size:
         axes.set_ylim(values.min() / 1.6, values.max() * 1.6)
@@ -353,9 +346,8 @@ def errors_svg(curves: Sequence[ErrorCurve], prefix: str = "errors") -> str:
         panels = figure.subplots(1, 1 + int(both), sharey=True, squeeze=False)[0]
         _draw_errors(panels[0], curves, left=False)
         everything = all(curve.fitted.all() for curve in curves)
-        panels[0].set_title(
-            "Levels as fitted" if everything else "Fitted levels (filled) and others (open)"
-        )
+        some = "Fitted levels (filled) and others (open)"
+        panels[0].set_title("Levels as fitted" if everything else some)
         panels[0].set_ylabel("rms error / largest force of the level [%]")
         if both:
             _draw_errors(panels[1], curves, left=True)
@@ -383,9 +375,8 @@ def _draw_residuals(axes: Axes, fit: MuscleFit, *, size: float = 34.0) -> Any:
     for rows, mark in ((keep[fitted[keep]], "o"), (keep[~fitted[keep]], "s")):
         if len(rows):
             x, y = 100 * contraction[rows], pressure[rows] / 1e3
-            colours = axes.scatter(
-                x, y, c=share[rows], marker=mark, edgecolor="#4b5563", lw=0.6, **style
-            )
+            style |= {"marker": mark, "edgecolor": "#4b5563", "lw": 0.6}
+            colours = axes.scatter(x, y, c=share[rows], **style)
     axes.set_xlabel("contraction [%]")
     axes.set_ylabel("pressure [kPa]")
     axes.margins(0.05)

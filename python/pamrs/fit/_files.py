@@ -127,7 +127,9 @@ def read_map(
     keep, notes = _kept(table, wanted, decimal, source)
     if where is None:
         _one_specimen(table, strange, source)
-    notes += _left_over(table, [heading for heading in strange if heading not in wanted])
+    if unused := [heading for heading in strange if heading not in wanted]:
+        notes.append(f"columns not used: {', '.join(unused)}")
+    notes += table.remarks
     values = {
         channel: _numbers(table, column, channel, source, decimal)[keep]
         for channel, column in found.items()
@@ -136,10 +138,12 @@ def read_map(
         contraction = _fraction(values["contraction"], source)
         notes += _narrow(contraction, found["contraction"])
         values["length"] = rest_length * (1.0 - contraction)
+    measured = ("length", "pressure", "force")
+    length, pressure, force = (values[name] for name in measured)
     return ForceMap.from_arrays(
-        length=values["length"],
-        pressure=values["pressure"],
-        force=values["force"],
+        length=length,
+        pressure=pressure,
+        force=force,
         rest_length=rest_length,
         direction=values.get("direction"),
         **levels,
@@ -147,25 +151,13 @@ def read_map(
         source=source,
         notes=notes,
         row_numbers=np.asarray(table.row_numbers)[keep].tolist(),
-        units={
-            channel: column.unit
-            for channel, column in found.items()
-            if channel in ("length", "pressure", "force")
-        },
+        units={name: found[name].unit for name in measured if name in found},
     )
-
-
-def _left_over(table: Table, strange: Sequence[str]) -> list[str]:
-    """Notes on what of a table is not used: columns of unknown meaning, and rows."""
-    notes = [f"columns not used: {', '.join(strange)}"] if strange else []
-    return [*notes, *table.remarks]
 
 
 def _texts(table: Table, found: Mapping[str, _Column]) -> list[Sequence[str]]:
     """Cells of the columns with numbers, where they are text."""
-    columns = [
-        table.cells(column.position) for channel, column in found.items() if channel != "direction"
-    ]
+    columns = (table.cells(own.position) for name, own in found.items() if name != "direction")
     return [cells for cells in columns if not isinstance(cells, np.ndarray)]
 
 
@@ -287,8 +279,10 @@ def _lacking(channels: Sequence[str], headings: Sequence[str], strange: Sequence
     maps = []
     for channel in channels:
         fitting = [heading for heading in strange if _measures(heading, _UNITS[channel])]
-        unit = _HEADING.match(fitting[0])["unit"].strip() if len(fitting) == 1 else _UNITS[channel]  # type: ignore[index]
-        maps.append(f'"{fitting[0] if len(fitting) == 1 else "..."}" = "{channel} [{unit}]"')
+        own, unit = "...", _UNITS[channel]
+        if len(fitting) == 1:
+            own, unit = fitting[0], _split(fitting[0])[1] or unit
+        maps.append(f'"{own}" = "{channel} [{unit}]"')
     names = ", ".join(
         channel + (" (or contraction)" if channel == "length" else "") for channel in channels
     )
@@ -310,20 +304,14 @@ def _measures(heading: str, si_unit: str) -> bool:
 
 def _numbers(table: Table, column: _Column, channel: str, source: str, decimal: str) -> Array:
     if channel == "direction" and not isinstance(table.cells(column.position), np.ndarray):
-        return _direction_cells(
-            [str(cell) for cell in table.cells(column.position)],
-            column.heading,
-            table.row_numbers,
-            source,
-        )
+        return _direction_cells(table, column, source)
     values = table.numbers(column.position, column.heading, source, None, decimal)
     unit = parse_unit(column.unit)
     return np.asarray(column.line.of(values) * unit.scale + unit.offset)
 
 
-def _direction_cells(
-    cells: Sequence[str], heading: str, numbers: Sequence[int], source: str
-) -> Array:
+def _direction_cells(table: Table, column: _Column, source: str) -> Array:
+    cells = [str(cell) for cell in table.cells(column.position)]
     values = np.zeros(len(cells))
     for row, cell in enumerate(cells):
         text = cell.strip().lower()
@@ -332,8 +320,8 @@ def _direction_cells(
         except ValueError:
             words = ", ".join(filter(None, _DIRECTIONS))
             raise RecordingError(
-                f"{source}: column {heading!r}, row {numbers[row]}: {cell[:40]!r} is not allowed: "
-                f"-1, 0, 1, {words}"
+                f"{source}: column {column.heading!r}, row {table.row_numbers[row]}: {cell[:40]!r} "
+                f"is not allowed: -1, 0, 1, {words}"
             ) from None
     return values
 
@@ -351,15 +339,11 @@ def _narrow(contraction: Array, column: _Column) -> list[str]:
     """A note if contractions in percent are as small as fractions would be."""
     finite = contraction[np.isfinite(contraction)]
     span = float(np.ptp(finite)) if len(finite) else 0.0
-    if (
-        parse_unit(column.unit).scale == 1.0
-        or not 0.0 < span < _NARROW
-        or float(np.max(np.abs(finite))) > _NARROW
-    ):
+    small = 0.0 < span < _NARROW and float(np.max(np.abs(finite))) <= _NARROW
+    if parse_unit(column.unit).scale == 1.0 or not small:
         return []
-    return [
-        f"contractions span only {100.0 * span:.2g} %: are they fractions? write contraction [1]"
-    ]
+    said = f"contractions span only {100.0 * span:.2g} %"
+    return [f"{said}: are they fractions? write contraction [1]"]
 
 
 def _cells(table: Table, heading: str, source: str) -> list[str]:
@@ -380,21 +364,18 @@ def _kept(
         cells = _cells(table, heading, source)
         same = np.array([_alike(cell, value, decimal) for cell in cells])
         if not same.any():
-            have = list(dict.fromkeys(cells))
+            have = ", ".join(list(dict.fromkeys(cells))[:12])
             raise RecordingError(
-                f"{source}: where: no row has {heading} = {value!r}; there are: "
-                f"{', '.join(have[:12])}"
+                f"{source}: where: no row has {heading} = {value!r}; there are: {have}"
             )
         keep &= same
     others = int((~keep).sum())
     chosen = ", ".join(f"{heading} = {value}" for heading, value in where.items())
     if not others:
         return keep, []
-    rows = (
-        f"1 row of the file is not {chosen} and belongs"
-        if others == 1
-        else f"{others} rows of the file are not {chosen} and belong"
-    )
+    rows = f"{others} rows of the file are not {chosen} and belong"
+    if others == 1:
+        rows = f"1 row of the file is not {chosen} and belongs"
     return keep, [f"{rows} to another map"]
 
 

@@ -141,10 +141,7 @@ class FrictionFit(View):
     isometric: bool = False
 
     def __repr__(self) -> str:
-        c0, c1 = (
-            self.params["friction_coefficient"].value,
-            self.params["friction_pressure_slope"].value,
-        )
+        c0, c1 = (item.value for item in self.params.values())
         law = f"max({c0:.4g} {'-' if c1 < 0.0 else '+'} {1e6 * abs(c1):.4g}/MPa P, {self.floor:g})"
         return f"FrictionFit(c_F = {law}, {len(self.levels)} levels)"
 
@@ -197,11 +194,8 @@ class FrictionFit(View):
         p = np.asarray(pressure, dtype=np.float64)
         if not np.all(np.isfinite(p)):
             raise ParameterError("pressure: a value is not finite")
-        line = (
-            self.params["friction_coefficient"].value
-            + self.params["friction_pressure_slope"].value * p
-        )
-        return np.maximum(line, self.floor)
+        c0, c1 = (item.value for item in self.params.values())
+        return np.maximum(c0 + c1 * p, self.floor)
 
     def mean_curve(self) -> tuple[Array, Array, Array]:
         """Pressure [Pa], contraction [1] and mean force of both branches [N] of all levels: data
@@ -227,9 +221,8 @@ class FrictionFit(View):
             A copy with the friction arguments replaced; its presliding distance stays where none
             was determinable.
         """
-        changes = {name: parameter.value for name, parameter in self.params.items()} | {
-            "friction_floor": self.floor
-        }
+        changes = {name: parameter.value for name, parameter in self.params.items()}
+        changes["friction_floor"] = self.floor
         if self.presliding is not None:
             changes["friction_presliding"] = self.presliding
         return muscle.replace(**changes)
@@ -249,7 +242,7 @@ class FrictionFit(View):
 
     def fit_report(self) -> str:
         """The result in words and a table."""
-        c0, c1 = self.params["friction_coefficient"], self.params["friction_pressure_slope"]
+        c0, c1 = self.params.values()
         lines = [
             "friction of the muscle: F_total = F + d c_F |F|, c_F = max(c0 + c1 P, floor)",
             f"  c0 = {c0.value:.4g} +- {c0.stderr:.2g}",
@@ -280,10 +273,8 @@ class FrictionFit(View):
     def _slope_words(self) -> str:
         if math.isnan(self.slope_pvalue):
             return "its significance cannot be tested without a spare pressure"
-        return (
-            f"{'significant' if self.slope_significant else 'not significant'}, p = "
-            f"{self.slope_pvalue:.2g}"
-        )
+        word = "significant" if self.slope_significant else "not significant"
+        return f"{word}, p = {self.slope_pvalue:.2g}"
 
 
 def fit_friction(data: ForceMap, *, floor: float = 0.01) -> FrictionFit:
@@ -316,18 +307,16 @@ def fit_friction(data: ForceMap, *, floor: float = 0.01) -> FrictionFit:
         raise RecordingError(f"{data.label}: {_NO_WAY}")
     held = held_lengths(e, gas)
     levels, issues = _isometric_levels(data, held) if held else _loops(data)
+    pressure, coefficient, _ = _columns(levels)
     line, above = _law(levels, floor)
-    above &= np.array([x.coefficient > floor for x in levels])
+    above &= coefficient > floor
     issues += _doubts(levels, above, floor)
     levels = [replace(x, at_floor=not bool(on)) for x, on in zip(levels, above, strict=True)]
     free = max(int(above.sum()) - 2, 0)
-    if held:
-        distance, reason = None, "not determinable: the length is held"
-    else:
+    distance, reason = None, "not determinable: the length is held"
+    if not held:
         distance, reason = _presliding(data, levels)
-    best = np.maximum(
-        line.values[0] + line.values[1] * np.array([x.pressure for x in levels]), floor
-    )
+    best = np.maximum(line.values[0] + line.values[1] * pressure, floor)
     names = {"friction_coefficient": "1", "friction_pressure_slope": "1/Pa"}
     return FrictionFit(
         params={
@@ -339,7 +328,7 @@ def fit_friction(data: ForceMap, *, floor: float = 0.01) -> FrictionFit:
         presliding_reason=reason,
         levels=levels,
         best_fit=best,
-        residual=np.array([x.coefficient for x in levels]) - best,
+        residual=coefficient - best,
         ndata=int(above.sum()),
         nvarys=2,
         nfree=free,
@@ -411,10 +400,8 @@ def _isometric_levels(
         If too few pressures have both branches.
     """
     gas, e, pull, _, way = data.used_rows()
-    issues = [
-        *data.issues,
-        "loops of pressure at held lengths: rising pressure counts as contracting",
-    ]
+    told = "loops of pressure at held lengths: rising pressure counts as contracting"
+    issues = [*data.issues, told]
     pairs = []
     for part in held:
         found = _pairs(gas[part], pull[part], way[part])
@@ -442,9 +429,8 @@ def _isometric_levels(
         coefficient, stderr = _coefficient(mean, half)
         size = np.abs(mean)
         middle = _ratio(pressure * size, size)  # weighted as the ratios are
-        levels.append(
-            FrictionLevel(middle, coefficient, stderr, at, mean, half, pressure, len(band))
-        )
+        parts = coefficient, stderr, at, mean, half, pressure, len(band)
+        levels.append(FrictionLevel(middle, *parts))
     return levels, issues
 
 
@@ -516,11 +502,9 @@ def _coefficient(mean: Array, half: Array) -> tuple[float, float]:
 def _merged(contraction: Array, force: Array) -> tuple[Array, Array]:
     """One branch by rising contraction; repeated passes are averaged."""
     spacing = float(np.ptp(contraction)) / _BINS
-    bins = (
-        np.rint((contraction - contraction.min()) / spacing).astype(np.int64)
-        if spacing > 0.0
-        else np.zeros(len(force), dtype=np.int64)
-    )
+    bins = np.zeros(len(force), dtype=np.int64)
+    if spacing > 0.0:
+        bins = np.rint((contraction - contraction.min()) / spacing).astype(np.int64)
     _, inverse, counts = np.unique(bins, return_inverse=True, return_counts=True)
     return np.bincount(inverse, contraction) / counts, np.bincount(inverse, force) / counts
 
@@ -535,13 +519,19 @@ def _ratio(half: Array, size: Array) -> float:
     return float(ratio[order][np.searchsorted(share, 0.5 * share[-1])])
 
 
+def _columns(levels: list[FrictionLevel]) -> tuple[Array, Array, Array]:
+    """Pressure, coefficient and its standard error of the levels."""
+    pressure, coefficient, stderr = (
+        np.array([getattr(x, key) for x in levels]) for key in ("pressure", "coefficient", "stderr")
+    )
+    return pressure, coefficient, stderr
+
+
 def _pooled(levels: list[FrictionLevel]) -> tuple[float, float]:
     """One coefficient for all levels and its standard error, from the levels' own errors or their
     scatter, whichever is larger.
     """
-    value, error = (
-        np.array([getattr(x, key) for x in levels]) for key in ("coefficient", "stderr")
-    )
+    _, value, error = _columns(levels)
     weight = 1.0 / np.maximum(error, 1e-9) ** 2
     mean = float(weight @ value / weight.sum())
     return mean, float(1.0 / math.sqrt(weight.sum()))
@@ -551,15 +541,12 @@ def _law(levels: list[FrictionLevel], floor: float) -> tuple[LevelLine, Mask]:
     """The line through the levels above the floor, and which they are: the split with the least
     squares of ``max(line, floor)``.
     """
-    pressure, value, error = (
-        np.array([getattr(x, key) for x in levels]) for key in ("pressure", "coefficient", "stderr")
-    )
+    pressure, value, error = _columns(levels)
     design = np.column_stack([np.ones_like(pressure), pressure])
     count = len(levels)
     best: tuple[float, LevelLine, Mask] | None = None
-    for first, last in [(0, n) for n in range(count, 1, -1)] + [
-        (n, count) for n in range(1, count - 1)
-    ]:
+    splits = [(0, n) for n in range(count, 1, -1)] + [(n, count) for n in range(1, count - 1)]
+    for first, last in splits:
         above = (np.arange(count) >= first) & (np.arange(count) < last)
         line = fit_levels(design[above], value[above], error[above])
         law = design @ line.values
@@ -615,10 +602,8 @@ def _presliding(data: ForceMap, levels: list[FrictionLevel]) -> tuple[float | No
         return value, f"{value * 1e3:.3g} mm, median of {len(found)} reversals"
     if not len(turns):
         return None, "not determinable: no reversal within a pressure"
-    return (
-        None,
-        f"not determinable: the rows are too sparse after {sparse} of {len(turns)} reversals",
-    )
+    few = f"the rows are too sparse after {sparse} of {len(turns)} reversals"
+    return None, f"not determinable: {few}"
 
 
 def _runs(level: NDArray[np.intp], way: NDArray[np.int8], turn: int) -> tuple[slice, slice]:

@@ -193,17 +193,17 @@ class MapFit(View):
         between = "not determinable, fewer than three levels"
         if not math.isnan(self.between):
             between = f"{self.between:.3g} N rms"
+        branches = []
+        if not math.isnan(self.half_width):
+            width = f"{self.half_width:.3g} N rms"
+            branches = [f"  each branch differs from it by {width}: hysteresis"]
         lines = [
             "force table of the muscle: monotone in pressure and contraction",
             f"  {len(p)} pressures from {p[0]:.4g} to {p[-1]:.4g} kPa, {len(e)} contractions from "
             f"{e[0]:.3g} to {e[-1]:.3g} %",
             f"  {self.rows} rows scatter by {self.scatter:.3g} N rms about it",
             f"  a pressure predicted by the others: {between}",
-            *(
-                []
-                if math.isnan(self.half_width)
-                else [f"  each branch differs from it by {self.half_width:.3g} N rms: hysteresis"]
-            ),
+            *branches,
             f"  model error: {100.0 * self.share:.2g} % of the force",
         ]
         return "\n".join([*lines, *(f"  note: {issue}" for issue in self.issues)]) + "\n"

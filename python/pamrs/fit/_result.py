@@ -67,10 +67,9 @@ class MuscleFit(View, FitStatistics):
     def all_residuals(self) -> Array:
         """Measured minus model force [N] of all used rows of the map, fitted or not."""
         everything = np.ones_like(self._rows)
-        matrix, target = self._problem.system(
-            self._estimate.design, self._estimate.blank, everything
-        )
-        return (target - matrix @ self._estimate.x) / self._problem.weight
+        found = self._estimate
+        matrix, target = self._problem.system(found.design, found.blank, everything)
+        return (target - matrix @ found.x) / self._problem.weight
 
     def error_by_pressure(self) -> PressureErrors:
         """The measure (2.37) of every level of the map, fitted or not: rms of
@@ -145,9 +144,8 @@ class MuscleFit(View, FitStatistics):
         rest = self._estimate.blank.parameters["rest_length"]
         contraction = contraction_of(contraction, length, rest)
         way = 0.0 if direction is None else direction
-        p, e, d = np.broadcast_arrays(
-            *(np.asarray(v, dtype=np.float64) for v in (pressure, contraction, way))
-        )
+        given = (np.asarray(v, dtype=np.float64) for v in (pressure, contraction, way))
+        p, e, d = np.broadcast_arrays(*given)
         for name, values in (("pressure", p), ("contraction", e), ("direction", d)):
             if not np.isfinite(values).all():
                 raise ParameterError(f"{name} has a value that is not finite")
@@ -174,16 +172,14 @@ class MuscleFit(View, FitStatistics):
             broadcast shape.
         """
         p, e, _ = self._points(pressure, contraction, length, None)
-        seen_e = (
-            1.0 - self._problem.length[self._rows] / self._estimate.blank.parameters["rest_length"]
-        )
+        rest = self._estimate.blank.parameters["rest_length"]
+        seen_e = 1.0 - self._problem.length[self._rows] / rest
         seen_p = self._problem.knot(self._rows)
         slack_p, slack_e = 1e-9 * float(seen_p.max()), 1e-9
         beyond_p = (p < seen_p.min() - slack_p) | (p > seen_p.max() + slack_p)
         beyond_e = (e < seen_e.min() - slack_e) | (e > seen_e.max() + slack_e)
-        return np.asarray(
-            beyond_p * OUTSIDE_PRESSURE + beyond_e * OUTSIDE_CONTRACTION, dtype=np.uint8
-        )
+        flags = beyond_p * OUTSIDE_PRESSURE + beyond_e * OUTSIDE_CONTRACTION
+        return np.asarray(flags, dtype=np.uint8)
 
     @quantities
     def predict(
@@ -270,15 +266,13 @@ class MuscleFit(View, FitStatistics):
         weights = design.weights(p)
 
         def force(muscle: Muscle) -> Array:
-            gas, columns = design.columns(
-                muscle, p, 1.0 - lengths / muscle.parameters["rest_length"], d, weights
-            )
+            contraction = 1.0 - lengths / muscle.parameters["rest_length"]
+            gas, columns = design.columns(muscle, p, contraction, d, weights)
             return np.asarray(gas + columns @ x)
 
         _, columns = design.columns(self._estimate.blank, p, e.ravel(), d, weights)
-        slopes = np.hstack(
-            [columns, geometry_slopes(self._problem, self._estimate.geometry, force, len(p))]
-        )
+        moved = geometry_slopes(self._problem, self._estimate.geometry, force, len(p))
+        slopes = np.hstack([columns, moved])
         variance = np.einsum("ni,ij,nj->n", slopes, self.covar, slopes)
         if new_point:
             if self.weights != "force":

@@ -45,11 +45,8 @@ GEOMETRY: Final[dict[str, str]] = {
 
 #: Coefficients of the models that can have a prior.
 COEFFICIENTS: Final[tuple[str, ...]] = (
-    "modulus_slope",
-    "modulus_offset",
-    "c10",
-    "c01",
-    "bladder_modulus",
+    *("modulus_slope", "modulus_offset"),
+    *("c10", "c01", "bladder_modulus"),
 )
 
 _ELLIPTIC_ONLY = ("k0", "contraction_slope", "extension_slope", "neck_floor")
@@ -219,9 +216,8 @@ def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) ->
             )
     if len(set(names)) < len(names):
         raise ParameterError(f"free = {list(names)} names a parameter twice")
-    return tuple(
-        Free(name, float(known[name]), float(tolerance.get(name, math.inf))) for name in names
-    )
+    spread = {name: float(tolerance.get(name, math.inf)) for name in names}
+    return tuple(Free(name, float(known[name]), spread[name]) for name in names)
 
 
 def _is_number(value: object) -> bool:
@@ -233,9 +229,8 @@ def _tolerances(tolerance: Mapping[str, float] | None) -> dict[str, float]:
     for name, value in (tolerance or {}).items():
         one_of("tolerance", name, allowed)
         if not (_is_number(value) and value > 0.0):
-            raise refused(
-                f"tolerance: {name}", value, "a positive number is needed (infinite for no prior)"
-            )
+            needed = "a positive number is needed (infinite for no prior)"
+            raise refused(f"tolerance: {name}", value, needed)
     return dict(tolerance or {})
 
 
@@ -249,9 +244,8 @@ def _known(muscle: Muscle, blank: Muscle, tolerance: Mapping[str, float]) -> dic
                 f"tolerance: {name!r} is not allowed: the model {blank.model} has no such "
                 "coefficient"
             )
-        known[name] = Known(
-            tuple(np.atleast_1d(own.get(name, 0.0)).tolist()), float(tolerance[name])
-        )
+        values = np.atleast_1d(own.get(name, 0.0)).tolist()
+        known[name] = Known(tuple(values), float(tolerance[name]))
     return known
 
 
@@ -317,16 +311,14 @@ def _result(
         if found.sigma > 0.0:
             count, needed = len(np.unique(problem.level[rows])), levels_needed(len(plain))
             why = (
-                (
+                f"errors by level leave out one level at a time, and one of the {count} cannot be "
+                "missed"
+            )
+            if count < needed:
+                why = (
                     f"errors by level need {needed} fitted levels for {len(plain)} unknowns, there "
                     f"are {count}"
                 )
-                if count < needed
-                else (
-                    f"errors by level leave out one level at a time, and one of the {count} cannot "
-                    "be missed"
-                )
-            )
             warnings.append(f"standard errors take the residuals as independent: {why}")
     covar = plain if kind == "plain" or robust is None else robust
     parameters = _parameters(problem, found, covar, plain)

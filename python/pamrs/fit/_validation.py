@@ -198,22 +198,14 @@ def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValida
     top = float(problem.force.max())
     ends = np.isin(level, [groups[0], groups[-1]])
     rms, worst = summary(error, top) or (0.0, 0.0)
-    interior = summary(error[~ends], top) or (None, None)
+    interior_rms, interior_max = summary(error[~ends], top) or (None, None)
     end_rms, end_max = summary(error[ends], top) or (0.0, 0.0)
     dropped = np.array([np.sqrt(np.mean(error[level != group] ** 2)) / top for group in groups])
     spread = float(np.sqrt((1.0 - 1.0 / len(groups)) * np.sum((dropped - dropped.mean()) ** 2)))
+    predicted = problem.force[rows] - error
+    inside, outside = (interior_rms, interior_max), (end_rms, end_max)
     return CrossValidation(
-        by_pressure,
-        problem.force[rows] - error,
-        error,
-        level,
-        rms,
-        worst,
-        interior[0],
-        interior[1],
-        end_rms,
-        end_max,
-        spread,
+        by_pressure, predicted, error, level, rms, worst, *inside, *outside, spread
     )
 
 
@@ -227,23 +219,18 @@ def _gone(problem: Problem, level: int, why: str) -> FitError:
 def _by_hat_matrix(problem: Problem, result: Estimate, level: NDArray[np.intp]) -> Array:
     if not result.jacobian.shape[1]:
         return result.residual
-    span, _, _ = np.linalg.svd(
-        result.jacobian / np.linalg.norm(result.jacobian, axis=0), full_matrices=False
-    )
+    scaled = result.jacobian / np.linalg.norm(result.jacobian, axis=0)
+    span, _, _ = np.linalg.svd(scaled, full_matrices=False)
     error = np.empty_like(result.residual)
     for group in np.unique(level):
         own = level == group
         left = np.eye(span.shape[1]) - span[own].T @ span[own]
         if np.linalg.eigvalsh(left)[0] < 1e-9:
-            raise _gone(
-                problem,
-                int(group),
-                f"{int(np.sum(~own))} points for {', '.join(result.design.names)}",
-            )
+            points = f"{int(np.sum(~own))} points for {', '.join(result.design.names)}"
+            raise _gone(problem, int(group), points)
         # (1 - H_g)^-1 r_g by the Woodbury identity: small matrices however long the level is.
-        error[own] = result.residual[own] + span[own] @ np.linalg.solve(
-            left, span[own].T @ result.residual[own]
-        )
+        moved = np.linalg.solve(left, span[own].T @ result.residual[own])
+        error[own] = result.residual[own] + span[own] @ moved
     return error
 
 

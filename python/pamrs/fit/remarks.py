@@ -221,16 +221,13 @@ def limits(fit: MuscleFit) -> list[str]:
             "not follow every level, or the gauge was off there."
         )
     cross, _ = cross_validation(fit)
-    if (
-        cross is not None
-        and cross.interior_rms is not None
-        and cross.end_rms > 2 * cross.interior_rms
-    ):
+    inside = None if cross is None else cross.interior_rms
+    if cross is not None and inside is not None and cross.end_rms > 2 * inside:
+        times = format_number(cross.end_rms / inside, 2)
         lines.append(
-            f"Predicted from the others, the lowest and the highest pressure come out "
-            f"{format_number(cross.end_rms / cross.interior_rms, 2)} "
-            f"times worse ({percent(cross.end_rms)} rms) than those between others "
-            f"({percent(cross.interior_rms)}): measure the ends of the range that matters."
+            "Predicted from the others, the lowest and the highest pressure come out "
+            f"{times} times worse ({percent(cross.end_rms)} rms) than those between others "
+            f"({percent(inside)}): measure the ends of the range that matters."
         )
     errors = fit.error_by_pressure()
     bad = errors.levels[errors.rms > max(3 * float(np.median(errors.rms)), 0.05)]

@@ -90,10 +90,8 @@ def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
     enough = np.flatnonzero(counts > terms)
     if not 2 <= len(enough) <= _MOST_LEVELS:
         return None
-    fixed = {
-        free.name: fit.params[free.name].value for free in fit.free if free.name != "rest_length"
-    }
-    if any(p.name == "rest_length" for p in fit.params.values()):
+    fixed = {free.name: fit.params[free.name].value for free in fit.free}
+    if "rest_length" in fixed:
         return None
     try:
         return fit.refitted(
@@ -117,21 +115,19 @@ def _parameters(fit: MuscleFit) -> list[dict[str, Any]]:
     rows = []
     for p in fit.params.values():
         unit, factor = _SHOWN_UNITS.get(p.unit, (p.unit, 1.0))
-        moved = (
-            None
-            if p.tolerance is None or p.init_value is None
-            else (p.value - p.init_value) / p.tolerance
-        )
+        nominal, moved = "", 0.0
+        if p.init_value is not None:
+            known = p.tolerance or 0.0
+            nominal = format_uncertain(p.init_value * factor, known * factor)
+            moved = (p.value - p.init_value) / known if known else 0.0
         rows.append(
             {
                 "name": p.name,
                 "value": format_uncertain(p.value * factor, p.stderr * factor),
                 "unit": unit,
-                "nominal": ""
-                if p.init_value is None
-                else format_uncertain(p.init_value * factor, (p.tolerance or 0.0) * factor),
-                "moved": "" if moved is None else remarks.signed(moved),
-                "alarm": moved is not None and abs(moved) > 3,
+                "nominal": nominal,
+                "moved": remarks.signed(moved) if nominal and p.tolerance else "",
+                "alarm": abs(moved) > 3,
                 "weak": p.stderr > abs(p.value),
             }
         )
@@ -143,15 +139,15 @@ def _share(value: float | None) -> str:
 
 
 def _levels(fit: MuscleFit) -> list[dict[str, Any]]:
+    import numpy as np
+
     errors = fit.error_by_pressure()
     cross, _ = remarks.cross_validation(fit)
-    predicted = (
-        {}
-        if cross is None
-        else dict(
-            zip(cross.by_pressure.levels.tolist(), cross.by_pressure.rms.tolist(), strict=True)
-        )
-    )
+    predicted: dict[float, float] = {}
+    if cross is not None:
+        left = cross.by_pressure
+        predicted = dict(zip(left.levels.tolist(), left.rms.tolist(), strict=True))
+    columns = (errors.levels, errors.points, errors.rms, errors.max, errors.fitted)
     return [
         {
             "level": f"{level / 1e3:.5g}",
@@ -161,30 +157,19 @@ def _levels(fit: MuscleFit) -> list[dict[str, Any]]:
             "left": _share(predicted.get(level)),
             "fitted": fitted,
         }
-        for level, points, rms, worst, fitted in zip(
-            errors.levels.tolist(),
-            errors.points.tolist(),
-            errors.rms.tolist(),
-            errors.max.tolist(),
-            errors.fitted.tolist(),
-            strict=True,
-        )
+        for level, points, rms, worst, fitted in zip(*map(np.ndarray.tolist, columns), strict=True)
     ]
 
 
 def _ranking(comparison: ModelComparison) -> list[dict[str, Any]]:
+    kept = ("model", "geometry", "nvarys", "rank", "reason", "recommended")
     shown = ("rms", "max", "lopo_rms", "lopo_max", "lopo_end_rms", "subset_rms", "subset_max")
     rows = []
     for row in comparison.rows:
         cells = {name: _share(row[name]) for name in shown}
-        cells |= {
-            name: format_number(row[name], 4) if row[name] is not None else "–"
-            for name in ("aicc", "bic")
-        }
-        start = {
-            name: row[name]
-            for name in ("model", "geometry", "nvarys", "rank", "reason", "recommended")
-        }
+        for name in ("aicc", "bic"):
+            cells[name] = "–" if row[name] is None else format_number(row[name], 4)
+        start = {name: row[name] for name in kept}
         rows.append({**start, **cells, "order": row["order"] or ""})
     return rows
 
@@ -196,14 +181,12 @@ def _facts(fit: MuscleFit) -> list[tuple[str, str]]:
     ]
     held_out = fit.errors_of("held_out")
     if held_out is not None:
-        facts.append(
-            (remarks.percent(held_out[1]), "largest error at pressures that were not fitted")
-        )
+        worst = remarks.percent(held_out[1])
+        facts.append((worst, "largest error at pressures that were not fitted"))
     cross, _ = remarks.cross_validation(fit)
     if cross is not None:
-        facts.append(
-            (remarks.percent(cross.rms), "rms, each fitted pressure predicted from the others")
-        )
+        rms = remarks.percent(cross.rms)
+        facts.append((rms, "rms, each fitted pressure predicted from the others"))
     facts.append((format_number(fit.condition_number, 2), "condition number"))
     return facts
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SCHEMA: Final = "pamrs.library/1"
 RELATIONS: Final = ("equals", "above", "below")
+_IDENTIFICATION: Final = ("prior", "condition", "angle")  # keys of `Entry.identification`
 
 
 @dataclass(frozen=True)
@@ -143,9 +144,7 @@ def read_entry(text: str, source: str) -> Entry:
             mass=None if mass is None else quantity(mass),
             max_pressure=quantity(document["properties"]["max_pressure"]),
             facts=tuple(_fact(item) for item in document.get("fact", [])),
-            identification={
-                key: document[key] for key in ("prior", "condition", "angle") if key in document
-            },
+            identification={key: document[key] for key in _IDENTIFICATION if key in document},
         )
     except tomllib.TOMLDecodeError as error:
         raise ParameterError(f"{source}: not valid TOML: {error}") from error

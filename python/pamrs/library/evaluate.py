@@ -66,9 +66,8 @@ def free_contraction(muscle: Muscle, pressure: float) -> float:
     first = int(pushing[0])
     if first == 0:
         return 0.0
-    found = root_between(
-        lambda e: float(muscle.force(pressure, e)), float(grid[first - 1]), float(grid[first])
-    )
+    low, high = float(grid[first - 1]), float(grid[first])
+    found = root_between(lambda e: float(muscle.force(pressure, e)), low, high)
     return float(grid[first]) if found is None else found
 
 
@@ -89,8 +88,8 @@ def polynomial(muscle: Muscle, pressure: float) -> np.ndarray[Any, np.dtype[np.f
     return slope * pressure + offset
 
 
-def _hoop_strain(muscle: Muscle, contraction: float) -> float:
-    return float(muscle.circumferential_strain(contraction))
+def _free_hoop_strain(muscle: Muscle, pressure: float) -> float:
+    return float(muscle.circumferential_strain(free_contraction(muscle, pressure)))
 
 
 def _angle_for_force(muscle: Muscle, pressure: float, force: float) -> float:
@@ -117,12 +116,11 @@ def _angle_for_diameter(muscle: Muscle, contraction: float, diameter: float) -> 
 
 
 def _wall_for_force(muscle: Muscle, pressure: float, force: float) -> float:
-    top = 0.45 * float(muscle.parameters["rest_diameter"])
-    found = root_between(
-        lambda wall: float(muscle.replace(wall_thickness=wall).force(pressure, 0.0)) - force,
-        1e-7,
-        top,
-    )
+
+    def excess(wall: float) -> float:
+        return float(muscle.replace(wall_thickness=wall).force(pressure, 0.0)) - force
+
+    found = root_between(excess, 1e-7, 0.45 * float(muscle.parameters["rest_diameter"]))
     if found is None:
         raise ParameterError(f"no wall gives a blocked force of {force:g} N")
     return found
@@ -220,9 +218,7 @@ KINDS: Final[dict[str, Callable[[Entry, At], float]]] = {
     "blocked_deadband": lambda entry, at: activation_pressure(entry.muscle, 0.0),
     "rubber_nonlinearity": lambda entry, at: _rubber_nonlinearity(entry.muscle, at["strain"]),
     "softening_strain": lambda entry, at: _softening_strain(entry.muscle, at["pressure"]),
-    "hoop_strain_free": lambda entry, at: _hoop_strain(
-        entry.muscle, free_contraction(entry.muscle, at["pressure"])
-    ),
+    "hoop_strain_free": lambda entry, at: _free_hoop_strain(entry.muscle, **at),
     "smallest_radius": lambda entry, at: _smallest_radius(entry.muscle),
     "closing_extension": lambda entry, at: _closing_extension(entry.muscle),
     "wall_from_closing": lambda entry, at: _wall_from_closing(entry.muscle, **at),

@@ -55,9 +55,8 @@ def description(name: str) -> str:
     """
     item = entry(name)
     values = {**item.parameters, "mass": item.mass, "max_pressure": item.max_pressure}
-    shown = {
-        key: "unknown" if value is None else _shown(key, value) for key, value in values.items()
-    }
+    known = {key: _shown(key, value) for key, value in values.items() if value is not None}
+    shown = dict.fromkeys(values, "unknown") | known
     width, room = max(map(len, shown)), max(map(len, shown.values()))
     lines = [f"{name}: {item.title}", ""]
     lines += [

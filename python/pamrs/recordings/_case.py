@@ -115,9 +115,7 @@ class Case(View):
     def channels(self) -> tuple[str, ...]:
         """The channels that every recording has."""
         first = self.recordings[0].channels
-        return tuple(
-            name for name in first if all(name in other.channels for other in self.recordings)
-        )
+        return tuple(name for name in first if all(name in r.channels for r in self.recordings))
 
     @classmethod
     def from_arrays(
@@ -350,11 +348,8 @@ def _rig(problems: list[str], home: Path, name: str) -> Rig | None:
 def _recordings(
     problems: list[str], home: Path, entries: Any, source: str, rig: Rig | None
 ) -> list[Recording]:
-    if (
-        not isinstance(entries, list)
-        or not entries
-        or not all(isinstance(entry, Mapping) for entry in entries)
-    ):
+    tables = isinstance(entries, list) and all(isinstance(entry, Mapping) for entry in entries)
+    if not (tables and entries):
         problems.append(
             "recording is missing: one table [[recording]] with file and role for each is needed"
         )
@@ -392,9 +387,8 @@ def _recordings(
                 options |= {"role": role, "name": entry.get("name"), "ambient_pressure": ambient}
                 whole = load_recording(file, **options)
                 parts = [whole.between(entry.get("start"), entry.get("stop"))]
-            recordings += [
-                _on_its_turn(replace(_once(part, told), parameters=own), rig) for part in parts
-            ]
+            said = (replace(_once(part, told), parameters=own) for part in parts)
+            recordings += [_on_its_turn(part, rig) for part in said]
         except RecordingError as error:
             problems.append(str(error))
     names = [recording.name for recording in recordings]
@@ -404,11 +398,7 @@ def _recordings(
         for name in dict.fromkeys(names)
         if names.count(name) > 1
     ]
-    if (
-        recordings
-        and not problems
-        and all(recording.role == "held_out" for recording in recordings)
-    ):
+    if recordings and not problems and all(each.role == "held_out" for each in recordings):
         problems.append("no recording has the role 'fit': nothing is left to fit")
     return recordings
 
@@ -441,11 +431,8 @@ def _on_its_turn(recording: Recording, rig: Rig | None) -> Recording:
         if turns and apart and limits[0] - slack <= low + away and high + away <= limits[1] + slack:
             text = f"{turns:+d} turns, which puts it between the ends in the rig file"
             issue = Issue("log", name, 0.0, recording.duration, text)
-            recording = replace(
-                recording,
-                channels=recording.channels | {name: values + away},
-                issues=[issue, *recording.issues],
-            )
+            channels = recording.channels | {name: values + away}
+            recording = replace(recording, channels=channels, issues=[issue, *recording.issues])
     return recording
 
 
@@ -461,11 +448,10 @@ def _own_values(
         return {}
     found: dict[str, OwnValue] = {}
     for name, entry in given.items():
-        where = f"{label}parameters.{name}"
         try:
             found[name] = _own_value(name, entry, rig)
         except ParameterError as error:
-            problems.append(f"{where}: {error}")
+            problems.append(f"{label}parameters.{name}: {error}")
     return found
 
 
@@ -523,11 +509,10 @@ def _from_log(
     ambient: float | None,
 ) -> list[Recording]:
     """The recordings of an entry that says where its channels are; a file is read once."""
-    names = entry.get("columns")
-    form = TextFormat(
-        **{key: entry[key] for key in DIALECT if key in entry},
-        columns=None if names is None else tuple(names),
-    )
+    dialect = {key: entry[key] for key in DIALECT if key in entry}
+    if "columns" in entry:
+        dialect["columns"] = tuple(entry["columns"])
+    form = TextFormat(**dialect)
     key = (os.path.realpath(file), form)
     if key not in logs:
         logs[key] = read_log(file, form)

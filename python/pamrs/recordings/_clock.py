@@ -13,6 +13,7 @@ from pamrs.errors import RecordingError
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Place = int | np.signedinteger
 
 GAP: Final = 1.6  # intervals longer than this many samples are holes
 _JUMP_HOLE: Final = 10  # samples left empty where the clock jumped: the true pause is unknown
@@ -185,26 +186,24 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
     jumps = (intervals < 0.0) | (intervals > max(recorded, 1000.0 * usual))
     elapsed = np.where(jumps, (_JUMP_HOLE + 1) * usual, intervals)
     placed = np.concatenate([[0.0], np.cumsum(elapsed)])
-    placed = _exact(placed, kept, jumps)
+    if not jumps.any():  # the stamps themselves, free of the rounding of a running sum
+        placed = kept - kept[0]
 
     if len(repeats):
         at = placed[np.searchsorted(rows, repeats, side="right") - 1]
         text = f"{len(repeats)} rows repeat the time of the row before and are left out"
         events.append(Event("clock_jump", float(at[0]), float(at[-1]), text))
-    for index in np.flatnonzero(jumps)[:_MOST_EVENTS]:
+    steps = np.flatnonzero(jumps)
+    for index in steps[:_MOST_EVENTS]:
         way = "back" if intervals[index] < 0 else "forward"
         text = (
             f"the clock steps {way} by {abs(float(intervals[index])):.6g} s; what follows is "
             f"placed after {_JUMP_HOLE} empty samples, because the true pause is not known"
         )
-        events.append(Event("clock_jump", float(placed[index]), float(placed[index + 1]), text))
-    further = int(jumps.sum()) - _MOST_EVENTS
-    if further > 0:
-        last = np.flatnonzero(jumps)
-        first_at, last_at = float(placed[last[_MOST_EVENTS]]), float(placed[last[-1] + 1])
-        events.append(
-            Event("clock_jump", first_at, last_at, f"{further} further steps of the clock")
-        )
+        events.append(_between(placed, index, index, text, "clock_jump"))
+    if len(steps) > _MOST_EVENTS:
+        text = f"{len(steps) - _MOST_EVENTS} further steps of the clock"
+        events.append(_between(placed, steps[_MOST_EVENTS], steps[-1], text, "clock_jump"))
     events += gaps(placed, elapsed, jumps, usual)
     check_samples(float(placed[-1]), step, source)
     return Grid(placed, rows, step, usual, events)
@@ -239,9 +238,9 @@ def _plain(interval: float, count: int) -> float:
     return float(f"{interval:.9g}")
 
 
-def _exact(placed: Array, kept: Array, jumps: Mask) -> Array:
-    """Without jumps the stamps themselves, free of the rounding of a running sum."""
-    return placed if jumps.any() else kept - kept[0]
+def _between(placed: Array, first: Place, last: Place, text: str, kind: str = "gap") -> Event:
+    """Something from the beginning of one interval to the end of another."""
+    return Event(kind, float(placed[first]), float(placed[last + 1]), text)
 
 
 def gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event]:
@@ -272,7 +271,7 @@ def gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event
             f"{len(holes)} gaps, about {total} samples ({share:.0f} %) are missing, the longest "
             f"gap {float(elapsed[holes].max()):.6g} s"
         )
-        return [Event("gap", float(placed[holes[0]]), float(placed[holes[-1] + 1]), text)]
+        return [_between(placed, holes[0], holes[-1], text)]
     late = missing <= _LATE
     found: list[Event] = []
     if late.sum() > _FEW_LATE:
@@ -281,14 +280,9 @@ def gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event
             f"timer jitter: {int(late.sum())} times one or two samples are late or missing, the "
             f"longest interval {longest:.6g} s"
         )
-        found = [Event("gap", float(placed[first]), float(placed[last + 1]), text)]
+        found = [_between(placed, first, last, text)]
         holes, missing = holes[~late], missing[~late]
     return found + [
-        Event(
-            "gap",
-            float(placed[i]),
-            float(placed[i + 1]),
-            f"no samples for {elapsed[i]:.6g} s (about {m} missing)",
-        )
+        _between(placed, i, i, f"no samples for {elapsed[i]:.6g} s (about {m} missing)")
         for i, m in zip(holes, missing, strict=True)
     ]

@@ -60,15 +60,15 @@ class Suspicion:
     text: str
 
 
+def _level(values: Array, share: float) -> float:
+    """A quantile; 0 where there is no value."""
+    good = values[np.isfinite(values)]
+    return float(np.quantile(good, share)) if good.size else 0.0
+
+
 def _top_of(values: Array) -> float:
-    """The largest value without spikes; 0 where there is none."""
-    good = values[np.isfinite(values)]
-    return float(np.quantile(good, _TOP)) if good.size else 0.0
-
-
-def _bottom(values: Array) -> float:
-    good = values[np.isfinite(values)]
-    return float(np.quantile(good, _LOW)) if good.size else 0.0
+    """The largest value without spikes."""
+    return _level(values, _TOP)
 
 
 def ambient_of(rig: Rig) -> float:
@@ -141,6 +141,11 @@ def _other(values: Array | float, said: str, other: str) -> Array | float:
     """SI values if the numbers were in another unit."""
     one, two = parse_unit(said), parse_unit(other)
     return (values - one.offset) / one.scale * two.scale + two.offset
+
+
+def _as_large(one: str, two: str) -> bool:
+    """Whether two units are of the same size."""
+    return abs(parse_unit(one).scale / parse_unit(two).scale - 1.0) < 1e-9
 
 
 def unit_trouble(channel: str, unit: str) -> str:
@@ -263,8 +268,7 @@ def _agrees(
         own = said.get(other, "")
         if other == name or not own or channel_of(other) not in (*PRESSURES, "supply_command"):
             continue
-        same = abs(parse_unit(own).scale / parse_unit(unit).scale - 1.0) < 1e-9
-        if not same and top / _OVER < _top_of(values) < top * _OVER:
+        if not _as_large(own, unit) and top / _OVER < _top_of(values) < top * _OVER:
             return True
     return False
 
@@ -272,10 +276,8 @@ def _agrees(
 def _fitting(top: float, unit: str, reference: float, least: float, most: float) -> str:
     """The unit of pressure with which the largest value fits; the first one, for there are few."""
     for other in _UNITS:
-        scale = parse_unit(other).scale
-        if abs(scale / parse_unit(unit).scale - 1.0) < 1e-9:
-            continue
-        if least <= float(_other(top, unit, other)) / reference <= most:
+        fits = least <= float(_other(top, unit, other)) / reference <= most
+        if fits and not _as_large(other, unit):
             return other
     return ""
 
@@ -285,13 +287,12 @@ def _absolute(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[
     good = values[np.isfinite(values)]
     if good.size < 20:
         return
-    ambient = AMBIENT if rig is None else ambient_of(rig)
-    low, span = _bottom(good), _top_of(good) - _bottom(good)
+    ambient, low = AMBIENT if rig is None else ambient_of(rig), _level(good, _LOW)
+    span = _top_of(good) - low
     near = 0.02 * max(span, 0.0) + 500.0
     rests, about = (float(np.mean(good <= low + width * near)) for width in (1.0, 2.0))
-    if rests < max(_REST, _STAYS * about) or span < 0.2 * ambient:
-        return
-    if channel_of(name) == "supply_pressure":
+    passes = rests < max(_REST, _STAYS * about) or span < 0.2 * ambient
+    if passes or channel_of(name) == "supply_pressure":
         return
     if abs(low - ambient) < _NEAR * ambient:
         yield Suspicion(
@@ -342,7 +343,7 @@ def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Sus
     given = limits_of(rig, name)
     low, high = given or ((-2.0 * np.pi, 2.0 * np.pi) if angle else (1e-3, 10.0))
     slack = _SLACK * (high - low) if given else 0.0
-    bottom, top = _bottom(values), _top_of(values)
+    bottom, top = _level(values, _LOW), _top_of(values)
 
     def fits(first: float, last: float) -> bool:
         return low - slack <= first and last <= high + slack
@@ -350,7 +351,7 @@ def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Sus
     if fits(bottom, top) and not (given and top - bottom < 0.02 * (high - low)):
         return
     for other in ("deg", "rad", "mrad", "rev") if angle else ("m", "mm", "cm", "in", "um"):
-        if abs(parse_unit(other).scale / parse_unit(unit).scale - 1.0) < 1e-9:
+        if _as_large(other, unit):
             continue
         first, last = (float(_other(edge, unit, other)) for edge in (bottom, top))
         if fits(first, last) and last - first > 5.0 * (top - bottom) * fits(bottom, top):
@@ -425,10 +426,8 @@ def _pressure_unit(
     """The unit in which the largest value is what the supply has or less; a muscle may hardly have
     been filled, which is thought of in bar alone.
     """
-    rated = (
-        [float(table["initial_pressure"]) for table in rig.tables("supply").values()] if rig else []
-    )
-    reference = max([*rated, 0.0]) or 8e5
+    supplies = rig.tables("supply").values() if rig else ()
+    reference = max([0.0, *(float(table["initial_pressure"]) for table in supplies)]) or 8e5
     least, most = (0.6, 1.5) if channel == "supply_pressure" else (0.03, 1.1)
     if channel == "ambient_pressure":
         reference, least, most = AMBIENT, 0.5, 1.15
@@ -442,10 +441,7 @@ def _pressure_unit(
         return stated, f"{numbers}, and another pressure of the log is in {stated}"
     fitting = [unit for unit in _UNITS if fits(unit)]
     if not fitting:
-        return (
-            "",
-            f"{numbers}, which is no likely pressure here in any of {', '.join(_UNITS)}",
-        )
+        return "", f"{numbers}, which is no likely pressure here in any of {', '.join(_UNITS)}"
     others = f"; {' or '.join(fitting[1:])} would fit, too" if fitting[1:] else ""
     return fitting[0], numbers + others
 

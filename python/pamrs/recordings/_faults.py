@@ -197,11 +197,9 @@ class _Stretches:
         signs = np.sign(steps)
         reversals = np.sum(signs[:, 1:] * signs[:, :-1] < 0, axis=1) + _skipped_reversals(signs)
         noisy = reversals >= 5
-        calm = (
-            spans <= np.quantile(spans[noisy], 0.5) * 2 + _REST * self.quantum
-            if noisy.any()
-            else noisy
-        )
+        calm = noisy
+        if noisy.any():
+            calm = spans <= np.quantile(spans[noisy], 0.5) * 2 + _REST * self.quantum
         alive = noisy & calm
         number = int(alive.sum())
         # noise that crosses one edge of a converter's steps, and no more, crosses none where the
@@ -223,19 +221,15 @@ class _Stretches:
             if extreme and self._ordinary_extreme(value):
                 continue
             long = stop - start > self.limit
-            if (
-                extreme
-                and CHANNELS[self.channel].has("clips")
-                and (long or self._cut_off(start, stop))
-            ):
+            clips = extreme and CHANNELS[self.channel].has("clips")
+            if clips and (long or self._cut_off(start, stop)):
                 clipped[value] = True
             elif (long and self._believable(start, stop)) or self._leaps(start, stop):
                 found.append(("frozen", start, stop))
         for value in clipped:
             at = (self.data[self.starts] == value) & (self.lengths >= 3)
-            found += [
-                ("saturated", int(self.starts[i]), int(self.stops[i])) for i in np.flatnonzero(at)
-            ]
+            ends = zip(self.starts[at].tolist(), self.stops[at].tolist(), strict=True)
+            found += [("saturated", start, stop) for start, stop in ends]
         return sorted(found, key=lambda item: item[1])
 
     def _ordinary_extreme(self, value: float) -> bool:

@@ -142,25 +142,20 @@ def completed(
     Recording
     """
     channels, masks = dict(recording.channels), dict(recording.mask)
-    units = dict(recording.units)
+    units, count = dict(recording.units), len(recording)
     for item in sources:
         if not item.column:
-            channels[item.channel] = np.full(len(recording), float(item.si(item.value)))
-            masks[item.channel] = np.ones(len(recording), dtype=bool)
+            channels[item.channel] = np.full(count, float(item.si(item.value)))
+            masks[item.channel] = np.ones(count, dtype=bool)
             units[item.channel] = _si_unit(item)
-    whole = replace(
-        recording,
-        channels=channels,
-        mask=masks,
-        units=units,
-        source=source,
-        said={item.channel: item.unit for item in sources},
-        notes={
-            item.channel: f"is assumed to be in {item.unit}: {item.assumed}"
-            for item in sources
-            if item.assumed
-        },
-    )
+    said = {item.channel: item.unit for item in sources}
+    notes = {
+        item.channel: f"is assumed to be in {item.unit}: {item.assumed}"
+        for item in sources
+        if item.assumed
+    }
+    whole = replace(recording, channels=channels, mask=masks, units=units)
+    whole = replace(whole, source=source, said=said, notes=notes)
     absolute = [item.channel for item in sources if item.absolute]
     return made_gauge(whole, absolute, ambient_pressure)
 
@@ -300,9 +295,9 @@ class Clocks:
                     f"{self.log.path}: {series.name!r} has {len(series.values)} values, but its "
                     f"times {stamps.name!r} are {len(stamps.values)}"
                 )
-        column: str | int | None = clock.column
-        if column is None:
-            column = len(series.values) if series.time is None else id(series.time)
+        column: str | int = clock.column or len(series.values)
+        if clock.column is None and series.time is not None:
+            column = id(series.time)
         key = (column, clock.unit, clock.offset)
         if key not in self._made:
             found, others = self._stamps(series, clock)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from pamrs.channels import CHANNELS, channel_of
-from pamrs.errors import RecordingError, joined
+from pamrs.errors import RecordingError, joined, meant
 from pamrs.recordings._doubts import unit_trouble
 from pamrs.recordings._from_log import check_asked, completed, recordings_of
 from pamrs.recordings._mapping import Clock, Source
@@ -126,8 +125,7 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, b
         channel = channel_of(name)
         known = channel in CHANNELS and (channel != "time" or name == channel)
         if match is None or not known or name.endswith("."):
-            near = difflib.get_close_matches(channel.lower(), CHANNELS, n=1, cutoff=0.6)
-            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(CHANNELS)}"
+            hint = meant(channel.lower(), CHANNELS)
             problems.append(
                 f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)"
             )
@@ -142,8 +140,7 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, b
             problems.append(f"column {heading!r}: the channel {name!r} is there twice")
         else:
             alone, kind = measured_from(unit.strip())
-            trouble = unit_trouble(channel, alone)
-            if trouble:
+            if trouble := unit_trouble(channel, alone):
                 problems.append(f"column {heading!r}: {trouble}")
             wanted[name] = (index, alone, kind == "absolute")
     if not problems and not set(wanted) - {"time"}:

@@ -90,20 +90,15 @@ def _table(problems: list[str], name: Any, table: Any, given: Mapping[str, str])
         problems.append(f"recording {name!r}: a name is needed that is a text")
     found = Arrays({}, {})
     if not is_table(table):
-        problems.append(
-            f"recording {name!r} = {as_said(table)}: a dict of arrays, DataFrame or Dataset is "
-            "needed"
-        )
+        needed = "a dict of arrays, DataFrame or Dataset is needed"
+        problems.append(f"recording {name!r} = {as_said(table)}: {needed}")
         return found
     pairs = [(*_heading(key), values) for key, values in table.items()]
     if "time" not in [key for key, _, _ in pairs]:
         pairs += _times(table)
     keys = [key for key, _, _ in pairs]
-    problems += [
-        f"recording {name!r} has {key!r} twice"
-        for key in dict.fromkeys(keys)
-        if keys.count(key) > 1
-    ]
+    twice = [key for key in dict.fromkeys(keys) if keys.count(key) > 1]
+    problems += [f"recording {name!r} has {key!r} twice" for key in twice]
     for key, unit, values in pairs:
         label = f"recording {name!r}, {key!r}"
         own = unit_of(key)

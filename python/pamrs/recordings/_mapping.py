@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import CHANNELS, channel_of
 from pamrs.declared import NAME, Rule, problems_of
-from pamrs.errors import ParameterError, RecordingError, joined
+from pamrs.errors import ParameterError, RecordingError, joined, meant
 from pamrs.recordings._case_keys import CHANNEL, CLOCK, CONSTANT
 from pamrs.recordings._doubts import unit_trouble
 from pamrs.recordings.calibration import Calibration, read_calibration
@@ -109,15 +108,10 @@ def read_sources(channels: Any, source: str) -> list[Source]:
             '{ column = "...", unit = "..." } is needed'
         )
     problems: list[str] = []
-    sources: list[Source] = []
-    for name, entry in _flat(channels):
-        before = len(problems)
-        made = _source(problems, name, entry)
-        if made is not None and len(problems) == before:
-            sources.append(made)
+    made = [_source(problems, name, entry) for name, entry in _flat(channels)]
     if problems:
         raise RecordingError(joined(source, problems))
-    return sources
+    return [each for each in made if each is not None]
 
 
 def _flat(channels: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
@@ -134,21 +128,19 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
     label = f"channels.{name}"
     channel = channel_of(name)
     if channel not in CHANNELS or channel == "time" or name.endswith("."):
-        near = difflib.get_close_matches(channel.lower(), CHANNELS, n=1)
-        known = ", ".join(key for key in CHANNELS if key != "time")
-        hint = f"did you mean {near[0]!r}?" if near else f"known are {known}"
+        known = [key for key in CHANNELS if key != "time"]
+        hint = meant(channel.lower(), known)
         hint = "times are given by the key time" if channel == "time" else hint
         problems.append(f"{label}: unknown channel {name!r}; {hint}")
         return None
     if not isinstance(entry, Mapping):
         problems.append(f'{label} = {entry!r} is not allowed: {{ column = "...", unit = "..." }}')
         return None
-    constant = "value" in entry
+    before, constant = len(problems), "value" in entry
     rules = CONSTANT if constant else CHANNEL
     needed = ("unit",) if constant else ("column", "unit")
-    wrong = problems_of(f"{label}.", entry, rules, needed=needed, skip=("time",))
-    problems += wrong
-    if wrong:
+    problems += problems_of(f"{label}.", entry, rules, needed=needed, skip=("time",))
+    if len(problems) > before:
         return None
     unit, kind = measured_from(entry["unit"])
     if trouble := unit_trouble(channel, unit):

@@ -84,10 +84,6 @@ class Match:
     time: dict[str, Any] = field(default_factory=dict)
     hold: bool = False
 
-    def with_clock(self, time: dict[str, Any], hold: bool) -> Match:
-        """The same with a clock."""
-        return replace(self, time=time, hold=hold)
-
     def si(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Its values in SI."""
         values = self.series.values
@@ -218,15 +214,10 @@ def matched(
             taken[column] = row
     for column, row in _lonely(candidates, wanted, taken):
         taken[column] = row
-    matches: list[Match] = []
-    left: list[Open] = []
     stated = _stated_pressure([candidates[row] for row in taken.values()])
-    for column in sorted(taken):
-        made = _match(wanted[column], candidates[taken[column]], rig, stated)
-        if isinstance(made, Match):
-            matches.append(made)
-        else:
-            left.append(made)
+    made = [_match(wanted[k], candidates[taken[k]], rig, stated) for k in sorted(taken)]
+    left = [each for each in made if isinstance(each, Open)]
+    matches = [each for each in made if isinstance(each, Match)]
     matches, remarks = _made_gauge(matches, rig)
     remarks += [
         f"{match.series.name} has no unit in the log: {match.unit} is assumed, {match.assumed}"
@@ -234,12 +225,12 @@ def matched(
         if match.assumed
     ]
     used = {candidates[row].name for row in taken.values()}
-    for series in candidates:
-        if series.name not in used and _role(series) in _COMMANDED and not series.labels:
-            remarks.append(
-                f"{series.name} is called like a command ({_role(series)}), and no command of this "
-                "rig is left for it: it is not taken for a measured channel"
-            )
+    remarks += [
+        f"{each.name} is called like a command ({_role(each)}), and no command of this rig is left "
+        "for it: it is not taken for a measured channel"
+        for each in candidates
+        if each.name not in used and _role(each) in _COMMANDED and not each.labels
+    ]
     return matches, left, remarks
 
 
@@ -269,17 +260,18 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
             return Open(name, series.name, weight, (), text)
         text = f"{series.name} {why}: give from and to, its calibration"
         return Open(name, series.name, usual, electric or (0.0, 1.0), text)
+    called = f"{series.name} is called like {name}"
     if series.unit.strip(" -1[](){}"):
         text = (
-            f"{series.name} is called like {name}, but the unit {series.unit!r} is not known: give "
-            "a unit, and scale and offset or from and to if it is none"
+            f"{called}, but the unit {series.unit!r} is not known: give a unit, and scale and "
+            "offset or from and to if it is none"
         )
         return Open(name, series.name, usual, (), text)
     unit, why = assumed_unit(name, series.values, rig, stated)
     if _AIR & set(words_of(series.name)) and channel in PRESSURES:
         unit, why = "", "ATM in its name may be the unit, or say that it is the air outdoors"
     if not unit:
-        text = f"{series.name} is called like {name}, and has no unit in the log: {why}; give it"
+        text = f"{called}, and has no unit in the log: {why}; give it"
         return Open(name, series.name, usual, (), text)
     absolute = same_dimension(unit, "Pa") and bool(_ABSOLUTE & set(words_of(series.name)))
     return Match(name, series, unit, absolute, assumed=why)
@@ -304,13 +296,10 @@ def _made_gauge(matches: list[Match], rig: Rig | None) -> tuple[list[Match], lis
     """Absolute pressures with what is subtracted from them, and words that say so."""
     recorded = next((each.si() for each in matches if each.channel == "ambient_pressure"), None)
     ambient, said = subtracted(recorded, None if rig is None else ambient_of(rig))
-    found, remarks = [], []
-    for match in matches:
-        if match.absolute and match.channel != "ambient_pressure":
-            remarks.append(f"{match.series.name} is an absolute pressure: {said}")
-            match = replace(match, subtracted=ambient)
-        found.append(match)
-    return found, remarks
+    absolute = [each.absolute and each.channel != "ambient_pressure" for each in matches]
+    pairs = list(zip(matches, absolute, strict=True))
+    found = [replace(each, subtracted=ambient) if its else each for each, its in pairs]
+    return found, [f"{m.series.name} is an absolute pressure: {said}" for m, its in pairs if its]
 
 
 def _role(series: Series) -> str:
@@ -369,9 +358,9 @@ def _called(series: Series, channel: str, words: set[str]) -> float:
     score = _STRONG * len(strong & words) + 1.0 * len(weak & words)
     if channel in PRESSURES and CHANNELS["ambient_pressure"].strong & words:
         return 0.0
-    others = _QUANTITIES | (
-        CHANNELS["supply_pressure"].weak if channel == "valve_command" else set()
-    )
+    others = set(_QUANTITIES)
+    if channel == "valve_command":
+        others |= CHANNELS["supply_pressure"].weak
     if channel in ("valve_command", "supply_command") and others & words and not strong & words:
         return 0.0
     if channel in _ONLY_STRONG and not (strong & words or named):
@@ -381,9 +370,8 @@ def _called(series: Series, channel: str, words: set[str]) -> float:
     if channel in _ONLY_NAMED:
         # where it is says more than what it is
         place, what = (weak, strong) if channel == "temperature" else (strong, weak)
-        elsewhere = CHANNELS["ambient_temperature"].strong | CHANNELS["supply_pressure"].strong - {
-            "tank"
-        }
+        elsewhere = CHANNELS["supply_pressure"].strong - {"tank"}
+        elsewhere |= CHANNELS["ambient_temperature"].strong
         if channel == "temperature" and elsewhere & words:
             return 0.0
         written = understood_unit(series.unit)
@@ -403,11 +391,11 @@ def _lonely(
         channel = channel_of(name)
         if channel in _ONLY_NAMED:
             continue
+        unit = CHANNELS[channel].unit
         rivals = [
             other
             for other in wanted
-            if CHANNELS[channel_of(other)].unit == CHANNELS[channel].unit
-            and channel_of(other) not in _ONLY_NAMED
+            if CHANNELS[channel_of(other)].unit == unit and channel_of(other) not in _ONLY_NAMED
         ]
         rows = [
             row

@@ -192,22 +192,19 @@ class Proposal:
     ) -> list[str]:
         file = os.path.relpath(resolved(item.log.path), resolved(folder))
         said = item.remarks if role == "fit" or pieces is None else []
-        lines = ["", *(f"# {shown(text)}" for text in said)]
-        lines += ["[[recording]]", f"file = {_toml(Path(file).as_posix())}", f'role = "{role}"']
-        if item.name:
-            lines.append(f"name = {_toml(item.name)}")
-        if self.columns is not None:
-            lines.append(f"columns = {_toml(list(self.columns))}")
-        if item.time:
-            lines.append(f"time = {_toml(item.time)}")
-        elif self.sample_time is not None and not any(
-            m.series.time is not None for m in item.matches
-        ):
-            lines.append(f"sample_time = {self.sample_time!r}")
-        if item.split is not None:
-            lines.append(f"split = {_toml(item.split)}")
-        if pieces is not None:
-            lines.append(f"pieces = {_toml(pieces)}")
+        clocked = item.time or any(m.series.time is not None for m in item.matches)
+        keys = {
+            "file": Path(file).as_posix(),
+            "role": role,
+            "name": item.name or None,
+            "columns": self.columns and list(self.columns),
+            "time": item.time or None,
+            "sample_time": None if clocked else self.sample_time,
+            "split": item.split,
+            "pieces": pieces,
+        }
+        lines = ["", *(f"# {shown(text)}" for text in said), "[[recording]]"]
+        lines += [f"{key} = {_toml(value)}" for key, value in keys.items() if value is not None]
         lines.append("[recording.channels]")
         for match in item.matches:
             unit = f"{match.unit}(a)" if match.absolute else match.unit
@@ -319,20 +316,19 @@ def _proposal(
     }
     held = _held({name: item.time for name, item in laid.items()})
     matches = [
-        match.with_clock(clocks.entries[match.series.name], match.channel in held)
-        for match in matches
+        replace(m, time=clocks.entries[m.series.name], hold=m.channel in held) for m in matches
     ]
     shared = next((match.time for match in matches if match.time and not match.hold), {})
     for match in matches:
+        name = match.series.name
         if match.channel not in known:
             remarks.append(
-                f"{match.series.name} has no clock: give the spacing of its samples "
-                "(--sample-time), or time in case.toml"
+                f"{name} has no clock: give the spacing of its samples (--sample-time), or time in "
+                "case.toml"
             )
         if match.hold:
             remarks.append(
-                f"{match.series.name} has few samples at uneven times: taken as logged on change "
-                "(hold)"
+                f"{name} has few samples at uneven times: taken as logged on change (hold)"
             )
     remarks += _rates(
         {m.channel: laid[m.channel].time for m in matches if not m.hold and m.channel in laid}
@@ -348,15 +344,14 @@ def _proposal(
     taken = {each.series.name for each in matches} | {each.series for each in left}
     taken |= {split["column"]} if isinstance(split, dict) and "column" in split else set()
     known_otherwise = NOT_A_CHANNEL | CLOCK_WORDS
-    remarks += _unused(
-        [
-            series.name
-            for series in candidates
-            if series.name not in taken
-            and known_otherwise.isdisjoint(words_of(series.name))
-            and not any(text.startswith(f"{series.name} ") for text in remarks)
-        ]
-    )
+    unused = [
+        series.name
+        for series in candidates
+        if series.name not in taken
+        and known_otherwise.isdisjoint(words_of(series.name))
+        and not any(text.startswith(f"{series.name} ") for text in remarks)
+    ]
+    remarks += _unused(unused)
     listed = [_listed(series, clocks.of(series), matches) for series in log.series.values()]
     read = [*log.remarks, *clocks.remarks]
     read += [f"{name}: {text}" for name, item in laid.items() for text in item.remarks]
@@ -476,23 +471,19 @@ class _Clocks:
 def _held(times: dict[str, Array]) -> set[str]:
     """Channels with few samples at uneven times beside the others."""
     most = max((len(time) for time in times.values()), default=0)
-    found = set()
-    for name, time in times.items():
+
+    def uneven(time: Array) -> bool:
         steps = np.diff(time)
         steps = steps[steps > 0.0]
-        uneven = len(steps) < 2 or float(np.std(steps)) > 0.5 * float(np.mean(steps))
-        if 5 * len(time) < most and uneven:
-            found.add(name)
-    return found
+        return len(steps) < 2 or float(np.std(steps)) > 0.5 * float(np.mean(steps))
+
+    return {name for name, time in times.items() if 5 * len(time) < most and uneven(time)}
 
 
 def _rates(times: dict[str, Array]) -> list[str]:
     """What becomes of channels that were sampled at different rates."""
-    rates: dict[str, float] = {}
-    for name, time in times.items():
-        rate = _rate(time, len(time))
-        if rate > 0.0 and channel_of(name) not in UNTOLD:
-            rates[name] = rate
+    told = {k: _rate(time, len(time)) for k, time in times.items() if channel_of(k) not in UNTOLD}
+    rates = {name: rate for name, rate in told.items() if rate > 0.0}
     if not rates or max(rates.values()) < 1.01 * min(rates.values()):
         return []
     fastest = max(rates, key=lambda name: rates[name])

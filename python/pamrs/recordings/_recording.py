@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -366,69 +366,74 @@ def assemble(
     if len(grid.time) < _FEW:
         text = f"{len(grid.time)} samples only: too few to judge noise or faults"
         issues.append(Issue("short", "time", 0.0, float(grid.time[-1]), text))
-    channels: dict[str, Array] = {}
-    masks: dict[str, Mask] = {}
-    logged: dict[str, tuple[float, Array]] = {}
-    for channel, values in raw.items():
-        own = (said or {}).get(channel, "")
-        laid = judged(channel, values[grid.rows], grid, source, issues, said=own)
-        channels[channel], masks[channel] = laid
-        if grid.interpolates:
-            logged[channel] = grid.usual, values[grid.rows]
-    issues.sort(key=lambda issue: (issue.start, issue.channel))
-    return Recording(
-        name,
-        role,
-        grid.time,
-        grid.sample_time,
-        channels,
-        masks,
-        issues,
-        dict(units),
-        logged=logged,
-    )
+    laid = {channel: Laid(values[grid.rows], grid) for channel, values in raw.items()}
+    return composed(name, role, laid, issues, source, units, said)
 
 
-def judged(
-    channel: str,
-    values: Array,
-    grid: Grid,
-    source: str,
+class Laid(NamedTuple):
+    """Values of a channel in SI, (r,), those of the rows that its grid uses, and that grid; held
+    ones were logged on change.
+    """
+
+    values: Array
+    grid: Grid
+    held: bool = False
+
+
+def composed(
+    name: str,
+    role: str,
+    laid: Mapping[str, Laid],
     issues: list[Issue],
-    *,
-    held: bool = False,
-    said: str = "",
-) -> tuple[Array, Mask]:
-    """One channel on the grid with its mask.
+    source: str,
+    units: Mapping[str, str],
+    said: Mapping[str, str] | None = None,
+) -> Recording:
+    """A recording of channels on grids with one time.
 
     Parameters
     ----------
-    channel : str
-        Its name.
-    values : (r,) array
-        SI values of the rows that the grid uses.
-    grid : Grid
-        The grid.
+    name, role : str
+        What it is called and for.
+    laid : mapping of str to Laid
+        Its channels, one at least.
+    issues : list of Issue
+        What was found before.
     source : str
         The file, for messages.
-    issues : list of Issue
-        Gets what is wrong with it.
-    held : bool
-        Logged on change: staying equal is its nature, and no fault.
-    said : str
-        The unit that the file says; another one that fits is named where the values are not
-        possible.
+    units : mapping of str to str
+        SI unit of each.
+    said : mapping of str to str, optional
+        The units that the file says, for what is said of impossible values.
 
     Returns
     -------
-    values, mask : (n,) arrays
+    Recording
 
     Raises
     ------
     RecordingError
-        If more than a few values are not possible.
+        If more than a few values of a channel are not possible.
     """
-    values = values.copy()
+    channels: dict[str, Array] = {}
+    masks: dict[str, Mask] = {}
+    logged: dict[str, tuple[float, Array]] = {}
+    for channel, own in laid.items():
+        unit = (said or {}).get(channel, "")
+        channels[channel], masks[channel] = _judged(channel, own, source, issues, unit)
+        if own.grid.interpolates:
+            logged[channel] = own.grid.usual, own.values
+    issues.sort(key=lambda issue: (issue.start, issue.channel))
+    grid = own.grid
+    step, units = grid.sample_time, dict(units)
+    return Recording(name, role, grid.time, step, channels, masks, issues, units, logged=logged)
+
+
+def _judged(
+    channel: str, laid: Laid, source: str, issues: list[Issue], said: str
+) -> tuple[Array, Mask]:
+    """One channel on its grid with its mask; what is wrong with it is added to the issues."""
+    values, grid = laid.values.copy(), laid.grid
     limits = CHANNELS[channel_of(channel)]
     usable = np.isfinite(values)
     impossible = usable & ((values < limits.lower) | (values > limits.upper))
@@ -445,7 +450,7 @@ def judged(
     found += _runs(impossible, "outlier", "an impossible value")
     usable &= ~impossible
     values[~usable] = np.nan
-    for fault in [] if held else find_faults(channel_of(channel), values):
+    for fault in [] if laid.held else find_faults(channel_of(channel), values):
         found.append(fault)
         if fault.masked:
             usable[fault.start : fault.stop] = False
@@ -453,15 +458,10 @@ def judged(
         same = [fault for fault in found if (fault.kind, fault.rail) == (kind, rail)]
         if len(same) > _FEW:
             total = sum(fault.stop - fault.start for fault in same)
-            start, _ = grid.when(same[0].start, same[0].stop)
-            _, stop = grid.when(same[-1].start, same[-1].stop)
             text = f"{len(same)} stretches, {total} samples in all"
-            issues.append(Issue(kind, channel, start, stop, text, rail))
-        else:
-            issues += [
-                Issue(kind, channel, *grid.when(one.start, one.stop), one.text, rail)
-                for one in same
-            ]
+            same = [Fault(kind, same[0].start, same[-1].stop, text)]
+        for one in same:
+            issues.append(Issue(kind, channel, *grid.when(one.start, one.stop), one.text, rail))
     return grid.lay(values, usable)
 
 

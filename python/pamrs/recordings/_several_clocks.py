@@ -20,7 +20,7 @@ from pamrs.recordings._clock import (
     gaps,
     usual_interval,
 )
-from pamrs.recordings._recording import Issue, Recording, assemble, judged
+from pamrs.recordings._recording import Issue, Laid, Recording, assemble, composed
 from pamrs.recordings._stamps import Rows, Ticks, filled_rows, spread, unwound
 
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
@@ -262,9 +262,7 @@ def on_one_clock(
     ended = [each for each in stepped if channel_of(each.name) not in SLOW] or stepped
     start, time = _common(ended, step, source)
     issues: list[Issue] = []
-    laid: dict[str, Array] = {}
-    masks: dict[str, Mask] = {}
-    logged: dict[str, tuple[float, Array]] = {}
+    laid: dict[str, Laid] = {}
     for channel in channels:
         own = rows[channel.name]
         stamps = channel.time[own] - start
@@ -279,14 +277,9 @@ def on_one_clock(
         if not channel.hold:
             issues += _missing(channel.name, stamps, interval, time, step)
         grid = kind(stamps, own, step, np.inf if channel.hold else interval, [], time)
-        laid[channel.name], masks[channel.name] = judged(
-            channel.name, channel.values[own], grid, source, issues, held=channel.hold
-        )
-        if grid.interpolates:
-            logged[channel.name] = grid.usual, channel.values[own]
-    issues.sort(key=lambda issue: (issue.start, issue.channel))
+        laid[channel.name] = Laid(channel.values[own], grid, channel.hold)
     units = {channel.name: channel.unit for channel in channels}
-    return Recording(name, role, time, step, laid, masks, issues, units, logged=logged)
+    return composed(name, role, laid, issues, source, units)
 
 
 def _rising(channel: Sampled, source: str) -> NDArray[np.intp]:

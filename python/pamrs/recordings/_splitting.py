@@ -140,14 +140,11 @@ def parts(
     if not found:
         raise RecordingError(f"{source}: split leaves no part in which every channel has samples")
     chosen = found if pieces is None else _chosen(found, pieces, short, source)
-    remarks = []
-    if short and pieces is None:
-        remarks.append(
-            f"{len(short)} of {len(made)} parts ({', '.join(short[:8])}) are left out: a channel "
-            f"has fewer than {_FEWEST} samples there"
-        )
-    left = [] if pieces is None else [part.label for part in made if part not in chosen]
-    return chosen, left, remarks
+    if pieces is not None:
+        return chosen, [part.label for part in made if part not in chosen], []
+    listed = f"{len(short)} of {len(made)} parts ({', '.join(short[:8])})"
+    remark = f"{listed} are left out: a channel has fewer than {_FEWEST} samples there"
+    return chosen, [], [remark] if short else []
 
 
 def stretches_of(cut: Cut, time: Array, column: Split | None) -> list[Stretch]:
@@ -168,19 +165,16 @@ def stretches_of(cut: Cut, time: Array, column: Split | None) -> list[Stretch]:
         Those that have a label, counted from 1.
     """
     if column is not None:
-        edges = np.flatnonzero(_differ(column.values)) + 1
-    elif cut.gap is not None:
-        edges = np.flatnonzero(np.diff(time) > cut.gap) + 1
+        begins = _differ(column.values)
     else:
-        edges = np.flatnonzero(np.diff(time) < 0.0) + 1
+        steps = np.diff(time)
+        begins = steps < 0.0 if cut.gap is None else steps > cut.gap
+    edges = np.flatnonzero(begins) + 1
     bounds = [0, *edges.tolist(), len(time)]
-    labels = _counted(len(bounds) - 1) if column is None else _labels(column, bounds)
-    named = [
-        (label, start, stop)
-        for start, stop, label in zip(bounds[:-1], bounds[1:], labels, strict=True)
-        if label
-    ]
-    return [Stretch(number, *rest) for number, rest in enumerate(named, start=1)]
+    starts = bounds[:-1]
+    labels = _labels(column, starts) if column else [str(k + 1) for k in range(len(starts))]
+    named = [part for part in zip(labels, starts, bounds[1:], strict=True) if part[0]]
+    return [Stretch(number, *part) for number, part in enumerate(named, start=1)]
 
 
 def _clock_of(item: Sampled) -> Ticks:
@@ -193,17 +187,13 @@ def _differ(values: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
     return np.asarray((values[1:] != values[:-1]) & ~both)
 
 
-def _counted(count: int) -> list[str]:
-    return [str(index + 1) for index in range(count)]
-
-
-def _labels(column: Split, bounds: Sequence[int]) -> list[str]:
+def _labels(column: Split, starts: Sequence[int]) -> list[str]:
     """What the column says in each part; what it says again gets a number. Parts without a value
     have no label and are left out.
     """
     seen: dict[str, int] = {}
     labels: list[str] = []
-    for start in bounds[:-1]:
+    for start in starts:
         value = float(column.values[start])
         if math.isnan(value) or (column.labels and not column.labels[int(value)].strip()):
             labels.append("")
@@ -268,18 +258,17 @@ def _chosen(
     kept: list[Part] = []
     labels: dict[int | str, Part] = {part.label: part for part in found}
     labels |= {part.number: part for part in found}
+    asked = f"{source}: pieces = {list(pieces)!r}"
     for piece in pieces:
         if not isinstance(piece, bool) and piece in labels:
             kept.append(labels[piece])
             continue
         if str(piece) in short:
-            raise RecordingError(
-                f"{source}: pieces = {list(pieces)!r}: in part {piece!r} a channel has fewer than "
-                f"{_FEWEST} samples"
-            )
+            few = f"a channel has fewer than {_FEWEST} samples"
+            raise RecordingError(f"{asked}: in part {piece!r} {few}")
         some = ", ".join(repr(part.label) for part in found[:8])
+        more = " and so on" if len(found) > 8 else ""
         raise RecordingError(
-            f"{source}: pieces = {list(pieces)!r}: there is no part {piece!r}; there are "
-            f"{len(found)}, called {some}{' and so on' if len(found) > 8 else ''}"
+            f"{asked}: there is no part {piece!r}; there are {len(found)}, called {some}{more}"
         )
     return kept

@@ -80,15 +80,10 @@ def unit_of_stamps(values: Array, name: str, said: str = "") -> tuple[str, str]:
             return unit, "" if unit == said else f"the times {name} are taken as {unit} by name"
     unit = _by_size(size, usual)
     apart = usual * parse_unit(unit).scale
+    why = f"have no unit in the log: {unit} is taken by their size"
     if said or spoken:
-        return unit, (
-            f"the times {name} reach {size:.4g}, which cannot be {said or spoken}: {unit} is "
-            f"taken, samples are then {apart:.4g} s apart"
-        )
-    return unit, (
-        f"the times {name} have no unit in the log: {unit} is taken by their size, samples are "
-        f"then {apart:.4g} s apart"
-    )
+        why = f"reach {size:.4g}, which cannot be {said or spoken}: {unit} is taken"
+    return unit, f"the times {name} {why}, samples are then {apart:.4g} s apart"
 
 
 def _last_word(name: str) -> str:

@@ -221,11 +221,11 @@ class Table:
             If a cell is not a number; the message names column, row and cell.
         """
         values, strange = self.read(index, thousands, decimal)
-        for row in strange:
-            text = self.cell(index, row)
+        if strange:
+            row, text = self.row_numbers[strange[0]], self.cell(index, strange[0])
             raise RecordingError(
-                f"{source}: column {label!r}, row {self.row_numbers[row]}: {text[:40]!r} is not a "
-                "number" + _number_hint(text, thousands, decimal)
+                f"{source}: column {label!r}, row {row}: {text[:40]!r} is not a number"
+                + _number_hint(text, thousands, decimal)
             )
         return values
 

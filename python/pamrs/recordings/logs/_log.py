@@ -137,6 +137,13 @@ class Log:
         )
 
 
+def series_of_texts(name: str, texts: Sequence[str], unit: str = "") -> Series:
+    """A column of texts: which of the different ones each is."""
+    labels = tuple(dict.fromkeys(texts))
+    place = {label: float(index) for index, label in enumerate(labels)}
+    return Series(name, np.array([place[text] for text in texts]), unit, None, labels)
+
+
 def table_of(log: Log) -> Table:
     """The series of a log that are as long as most, with their units in the headings.
 

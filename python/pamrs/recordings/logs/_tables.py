@@ -9,7 +9,14 @@ import numpy as np
 
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import admit_arrow, admit_numpy
-from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, numbers_of
+from pamrs.recordings.logs._log import (
+    Log,
+    Series,
+    TextFormat,
+    collected,
+    numbers_of,
+    series_of_texts,
+)
 from pamrs.recordings.logs._words import split_heading
 
 
@@ -44,11 +51,7 @@ def read_arrow(path: Path, form: TextFormat) -> Log:
         kept = table.column(column.name)
         values = numbers_of(kept.to_numpy())
         if values is None:
-            texts = [str(item) for item in kept.to_pylist()]
-            labels = tuple(dict.fromkeys(texts))
-            place = {label: float(index) for index, label in enumerate(labels)}
-            codes = np.array([place[text] for text in texts])
-            found.append(Series(name, codes, unit, None, labels))
+            found.append(series_of_texts(name, [str(item) for item in kept.to_pylist()], unit))
             continue
         stamps = str(column.type).startswith(("timestamp", "duration", "time"))
         if stamps:

@@ -12,7 +12,7 @@ import numpy as np
 from pamrs.errors import RecordingError
 from pamrs.recordings._dates import is_moment, moments
 from pamrs.recordings.dialect import BESIDE_COMMAS, Dialect, dialect_of, is_number, is_useful
-from pamrs.recordings.logs._log import Log, Series, TextFormat, collected
+from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, series_of_texts
 from pamrs.recordings.logs._serial import arrows_apart, labelled_rows
 from pamrs.recordings.logs._words import split_heading, understood_unit, unwrapped
 from pamrs.recordings.table import (
@@ -292,12 +292,10 @@ def _column(
         remarks += [f"{name}: {stamps[1]}"] if stamps[1] else []
         found.append(Series(name, stamps[0], "s", stamps=True))
         return
-    labels = tuple(dict.fromkeys(cells))
-    if len(labels) > _MOST_TEXTS:
-        unread[name] = f"it has {len(labels)} different texts"
+    if (count := len(set(cells))) > _MOST_TEXTS:
+        unread[name] = f"it has {count} different texts"
         return
-    numbers = {label: float(i) for i, label in enumerate(labels)}
-    found.append(Series(name, np.array([numbers[cell] for cell in cells]), "", None, labels))
+    found.append(series_of_texts(name, cells))
 
 
 def _grouped(cells: Sequence[str], decimal: str) -> str:

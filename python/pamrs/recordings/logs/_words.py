@@ -71,18 +71,9 @@ _COUNTS: Final = frozenset(
 )
 #: In any capitals a pressure is one: PSIA, KPa, MMHG.
 _PRESSURES: Final = (
-    "kgf/cm2",
-    "mmH2O",
-    "cmH2O",
-    "inH2O",
-    "mH2O",
-    "mmHg",
-    "inHg",
-    "mmWC",
-    "inWC",
-    "Torr",
-    "mbar",
-) + ("mWC", "kPa", "MPa", "hPa", "bar", "psi", "atm", "Pa", "at")
+    *("kgf/cm2", "mmH2O", "cmH2O", "inH2O", "mH2O", "mmHg", "inHg", "mmWC", "inWC", "Torr"),
+    *("mbar", "mWC", "kPa", "MPa", "hPa", "bar", "psi", "atm", "Pa", "at"),
+)
 
 
 class Written(NamedTuple):
@@ -149,9 +140,8 @@ def unwrapped(text: str) -> str:
 
 def _closed(text: str) -> bool:
     """Whether every round bracket that is closed was opened before."""
-    return all(
-        text.count("(", 0, end) >= text.count(")", 0, end) for end in range(1, len(text) + 1)
-    )
+    ends = range(1, len(text) + 1)
+    return all(text.count("(", 0, end) >= text.count(")", 0, end) for end in ends)
 
 
 def _pressure(text: str) -> list[str]:
@@ -226,11 +216,7 @@ def _unit_among(heading: str) -> str:
     """
     for text in (heading.strip(), re.sub(r"(?<=[a-zäöü0-9])(?=[A-Z])", "_", heading.strip())):
         words = re.split(r"[_.\s-]+", text)[1:]
-        units = {
-            word
-            for word in words
-            if (len(word) > 1 and word in _TAILS or word.upper() in _CAPITALS) and word != "atm"
-        }
+        units = {word for word in words if _like_a_tail(word) and word != "atm"}
         if units:
             return units.pop() if len(units) == 1 else ""
     return ""
@@ -243,8 +229,10 @@ def _like_a_unit(text: str) -> bool:
         plain in _COUNTS
         or "/" in plain
         or any(plain.startswith(unit.lower()) for unit in _PRESSURES if len(unit) > 2)
-        or any(
-            len(word) > 1 and (word in _TAILS or word.upper() in _CAPITALS)
-            for word in re.split(r"[^A-Za-z]+", text)
-        )
+        or any(map(_like_a_tail, re.split(r"[^A-Za-z]+", text)))
     )
+
+
+def _like_a_tail(word: str) -> bool:
+    """Whether a word of more than one letter is a unit that names end with."""
+    return len(word) > 1 and (word in _TAILS or word.upper() in _CAPITALS)
