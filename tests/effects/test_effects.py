@@ -123,10 +123,8 @@ def test_a_fit_can_read_the_table(info: EffectInfo) -> None:
             assert p.meaning
     for form in info.forms[1:]:
         # what is usual of it may be another: a push is harder than what pulls all the time
-        same = [
-            (replace(p, prior=None), replace(known[p.name], prior=None)) for p in form.parameters
-        ]
-        assert all(own == other for own, other in same)
+        for p in form.parameters:
+            assert replace(p, prior=None) == replace(known[p.name], prior=None)
         sizes = {p.name for p in form.parameters if p.role_in(sealed=False) == "size"}
         assert sizes & {p.name for p in info.parameters} or "share" in sizes
 
