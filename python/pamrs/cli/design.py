@@ -311,9 +311,9 @@ def _document(title: str, found: _Found) -> str:
             "bounds": {name: list(pair) for name, pair in problem.bounds.items()},
             "max_contraction": problem.max_contraction,
         },
-        design=found.design.to_dict(),
-        minimum_pressure=None if found.lowest is None else found.lowest.to_dict(),
-        least_pressure=None if found.strict is None else found.strict.to_dict(),
+        design=found.design,
+        minimum_pressure=found.lowest,
+        least_pressure=found.strict,
         comparison=None if found.comparison is None else found.comparison.rows(),
-        front=None if found.front is None else found.front.to_dict(),
+        front=found.front,
     )
