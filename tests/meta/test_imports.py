@@ -22,11 +22,10 @@ LAYERS = (
     (
         "comparison",
         "findings",
+        "_arrays",
         "_files",
         "_losses",
-        "_normal",
         "_progress",
-        "_stretches",
         "_tables",
         "_termination",
         "_views",

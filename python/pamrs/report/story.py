@@ -175,7 +175,7 @@ def _listed(names: Sequence[str], most: int, last: str) -> str:
     told = list(names[:most])
     if len(names) > most:
         told.append(f"{len(names) - most} more")
-    return f" {last} ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    return words.listed(told, last)
 
 
 def _phrase(diagnosis: Findings, block: BlockVerdict, most: int) -> str:

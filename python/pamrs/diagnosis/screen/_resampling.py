@@ -16,7 +16,7 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._normal import solve_normal
+from pamrs._arrays import solve_normal
 from pamrs.diagnosis.fit import FIT_BIN_TIME
 from pamrs.diagnosis.screen._screening import Screen, best_size
 from pamrs.diagnosis.settings import DiagnosisSettings
