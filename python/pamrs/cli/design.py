@@ -13,15 +13,7 @@ import typer
 
 from pamrs._checks import refused
 from pamrs._writing import check_writable, write_atomically
-from pamrs.cli._shared import (
-    Contents,
-    document,
-    exact,
-    file_of,
-    json_help,
-    named_muscle,
-    write,
-)
+from pamrs.cli._shared import Contents, document, exact, file_of, json_help, named_muscle, write
 from pamrs.cli._streams import terminal
 from pamrs.units import bar_and_psi
 

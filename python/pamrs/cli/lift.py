@@ -8,16 +8,7 @@ from typing import Annotated, Final
 import typer
 
 from pamrs._writing import check_writable
-from pamrs.cli._shared import (
-    RigName,
-    document,
-    exact,
-    file_of,
-    json_help,
-    naming,
-    rig_named,
-    write,
-)
+from pamrs.cli._shared import RigName, document, exact, file_of, json_help, naming, rig_named, write
 
 SCHEMA: Final = "pamrs.lift/1"
 

@@ -21,9 +21,7 @@ rig_app = typer.Typer(help="Work with rig files.")
 
 
 @rig_app.command("check")
-def _rig_check(
-    file: RigName,
-) -> None:
+def _rig_check(file: RigName) -> None:
     """Check a rig file, say what is connected to what, and list its parameters, and those of its
     effects with their bounds, in SI units; what is possible and hardly meant is a warning.
     """

@@ -12,15 +12,7 @@ import typer
 from pamrs._checks import refused
 from pamrs._writing import check_writable, write_atomically
 from pamrs.channels import channel_of, dotted, laboratory_unit, unit_of
-from pamrs.cli._shared import (
-    Contents,
-    RigName,
-    exact,
-    progress,
-    rig_named,
-    usable_samples,
-    write,
-)
+from pamrs.cli._shared import Contents, RigName, exact, progress, rig_named, usable_samples, write
 from pamrs.errors import ParameterError, RecordingError, meant
 from pamrs.units import with_unit
 

@@ -12,14 +12,7 @@ from matplotlib.figure import Figure
 from pamrs.findings import Findings
 from pamrs.report import story
 from pamrs.report.chain import draw_chain
-from pamrs.report.figures import (
-    COLOURS,
-    STYLE,
-    draw_panels,
-    free_head,
-    free_panels,
-    summary_figure,
-)
+from pamrs.report.figures import COLOURS, STYLE, draw_panels, free_head, free_panels, summary_figure
 from pamrs.rig import Rig
 
 

@@ -8,13 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis
-from pamrs.findings import (
-    HEALTHY,
-    BlockVerdict,
-    EffectFound,
-    EffectParameterFound,
-    Findings,
-)
+from pamrs.findings import HEALTHY, BlockVerdict, EffectFound, EffectParameterFound, Findings
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
