@@ -57,13 +57,7 @@ def check_names(what: str, names: Iterable[str], known: Iterable[str], kind: str
 
 def as_column(name: str, values: Any) -> NDArray[np.float64]:
     """An array of one dimension, with one number at least."""
-    import numpy as np
-
-    without_units(name, values)
-    try:
-        column = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise refused(name, values, "numbers are needed") from None
+    column = as_numbers(name, values).copy()
     if column.ndim != 1 or column.size == 0:
         raise ParameterError(f"{name} has the shape {column.shape}; (n,) with n >= 1 is needed")
     return column
@@ -80,7 +74,7 @@ def contraction_of(contraction: Any, length: Any, rest_length: float) -> Any:
     return 1.0 - np.asarray(plain("length", length, "m"), dtype=np.float64) / rest_length
 
 
-def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
+def as_numbers(name: str, values: Any, most: int | None = None) -> NDArray[np.float64]:
     """An array of numbers that is not larger than it may be.
 
     Parameters
@@ -89,7 +83,7 @@ def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
         What it is, for the message.
     values : array_like
         What was given.
-    most : int
+    most : int, optional
         Numbers that it may have.
 
     Returns
@@ -105,11 +99,11 @@ def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
 
     without_units(name, values)
     size = getattr(values, "size", 0)  # an array that repeats one number is larger than it looks
-    if isinstance(size, int) and size > most:
+    if most is not None and isinstance(size, int) and size > most:
         raise ParameterError(f"{name} has {size} numbers, which is not allowed: at most {most} are")
     try:
         return np.asarray(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError, OverflowError):
+    except _NO_NUMBER:
         raise refused(name, values, "numbers are needed") from None
 
 

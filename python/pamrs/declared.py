@@ -119,21 +119,9 @@ def told(
     origin : str
         Where the number comes from.
     """
-    return {
-        "about": about,
-        "key": key,
-        "json": json,
-        "optional": optional,
-        "omit_empty": omit_empty,
-        "kind": kind,
-        "enum": tuple(enum),
-        "required": required and not optional and not omit_empty,
-        "least_length": least_length,
-        "unit": unit,
-        "least": least,
-        "most": most,
-        "origin": origin,
-    }
+    given = locals()
+    relied_on = required and not optional and not omit_empty
+    return given | {"enum": tuple(enum), "required": relied_on}
 
 
 def reference(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:

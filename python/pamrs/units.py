@@ -59,7 +59,6 @@ DIMENSIONS: Final[dict[str, str]] = {
 _Vector = tuple[int, int, int, int, int, int, int]
 _NONE: Final[_Vector] = (0, 0, 0, 0, 0, 0, 0)
 _M: Final[_Vector] = (1, 0, 0, 0, 0, 0, 0)
-_M2: Final[_Vector] = (2, 0, 0, 0, 0, 0, 0)
 _M3: Final[_Vector] = (3, 0, 0, 0, 0, 0, 0)
 _KG: Final[_Vector] = (0, 1, 0, 0, 0, 0, 0)
 _S: Final[_Vector] = (0, 0, 1, 0, 0, 0, 0)

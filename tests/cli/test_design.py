@@ -4,6 +4,7 @@ import json
 import math
 import re
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -26,10 +27,7 @@ ARGUMENTS = {
 
 
 def words(*more, **changes):
-    given = {
-        **ARGUMENTS,
-        **{f"--{name.replace('_', '-')}": value for name, value in changes.items()},
-    }
+    given = ARGUMENTS | {f"--{name.replace('_', '-')}": value for name, value in changes.items()}
     return ["design", "joint", *(word for pair in given.items() for word in pair), *map(str, more)]
 
 
@@ -39,13 +37,8 @@ def run(capsys, arguments):
 
 def test_a_design_is_printed_and_repeats_by_its_seed(capsys):
     low = run(capsys, words("--method", "de", pressure="183 psi"))[1]
-    assert re.search(
-        (
-            r"met within 0\.1 % of the work wanted; least torque [\d.]+ % below the wanted one at "
-            r"[\d.]+ deg"
-        ),
-        low,
-    )
+    least = r"least torque [\d.]+ % below the wanted one at [\d.]+ deg"
+    assert re.search(rf"met within 0\.1 % of the work wanted; {least}", low)
     assert "the requirement is met" not in low
     code, out, err = run(capsys, words("--method", "de"))
     assert (code, err) == (0, "")
@@ -60,12 +53,8 @@ def test_a_design_is_printed_and_repeats_by_its_seed(capsys):
 def test_files_hold_the_design(capsys, tmp_path, method):
     data, picture, block = (tmp_path / name for name in ("a.json", "a.png", "a.toml"))
     outputs = ["--json", data, "--png", picture, "--rig-joint", block]
-    code, out, err = run(
-        capsys,
-        words(
-            "--method", method, "--bounds", "lu=10:60 mm", "--bounds", "rl=0 in:0.5 in", *outputs
-        ),
-    )
+    bounds = ("--bounds", "lu=10:60 mm", "--bounds", "rl=0 in:0.5 in")
+    code, out, err = run(capsys, words("--method", method, *bounds, *outputs))
     assert code == 0
     assert sorted(err.splitlines()) == sorted(f"written: {path}" for path in (data, picture, block))
     document = json.loads(data.read_text())
@@ -91,25 +80,11 @@ def test_minimum_pressure_comparison_and_front(capsys, tmp_path, monkeypatch):
     from pamrs import design
 
     front = design.pareto_front
-    monkeypatch.setattr(
-        design,
-        "pareto_front",
-        lambda problem, **kw: front(problem, population=20, generations=10, **kw),
-    )
+    monkeypatch.setattr(design, "pareto_front", partial(front, population=20, generations=10))
     data, picture = tmp_path / "a.json", tmp_path / "a.png"
     outputs = ["--json", data, "--png", picture]
-    code, out, _ = run(
-        capsys,
-        words(
-            "--method",
-            "de",
-            "--minimise-pressure",
-            "--compare",
-            "--pareto",
-            *outputs,
-            evaluations="100",
-        ),
-    )
+    wanted = ("--method", "de", "--minimise-pressure", "--compare", "--pareto")
+    code, out, _ = run(capsys, words(*wanted, *outputs, evaluations="100"))
     assert code == 0
     document = json.loads(data.read_text())
     lowest = document["minimum_pressure"]
@@ -156,18 +131,13 @@ def test_wrong_input_is_named(capsys, changes, more, part):
 
 @pytest.mark.parametrize(
     ("package", "more"),
-    [
-        ("deap", []),
-        ("cma", ["--method", "cma"]),
-        ("deap", ["--method", "de", "--pareto"]),
-    ],
+    [("deap", []), ("cma", ["--method", "cma"]), ("deap", ["--method", "de", "--pareto"])],
 )
 def test_a_missing_package_is_named(capsys, tmp_path, monkeypatch, package, more):
     monkeypatch.chdir(tmp_path)
-    for name in [
-        name for name in sys.modules if name.startswith((package, "pamrs.design._genetic"))
-    ]:
-        monkeypatch.delitem(sys.modules, name)
+    for name in list(sys.modules):
+        if name.startswith((package, "pamrs.design._genetic")):
+            monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     code, out, err = run(capsys, words(*more, evaluations="20"))
     assert (code, out) == (2, "")

@@ -54,12 +54,6 @@ def test_its_snippet_switches_it_on_with_the_usual_values(effect):
     assert read.effects == plain.with_effect(effect).effects
 
 
-def test_a_snippet_takes_values():
-    assert 'conductance   = { value = 2e-11, unit = "m3/(s Pa)" }' in text.snippet(
-        "leak_muscle", {"conductance": 2e-11}
-    )
-
-
 def two_forms(monkeypatch):
     """The leak with another second form."""
     leak = EFFECTS["leak_muscle"]
@@ -100,8 +94,6 @@ def test_a_snippet_takes_a_block():
     assert read.effects == rig.with_effect("leak_muscle", at="flexor").effects
     with pytest.raises(ParameterError, match="at = 'a' is not allowed: clock_skew acts on the"):
         text.snippet("clock_skew", at="a")
-    with pytest.raises(ParameterError, match="leak_muscle has no parameter 'width'"):
-        text.snippet("leak_muscle", {"width": 1.0})
 
 
 def test_an_effect_of_an_unknown_block_is_not_dropped(monkeypatch):

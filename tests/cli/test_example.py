@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs import cli
 from pamrs.recordings import load_case
+from tests.scripts import command
 
 ROOT = Path(__file__).parents[2]
 FILES = ROOT / "python" / "pamrs" / "cli" / "example_files"
@@ -32,11 +32,11 @@ def test_every_file_is_copied_and_the_next_words_name_them(tmp_path, capsys, mad
     folder = tmp_path / "my example"
     if made_before:
         folder.mkdir()
-    assert cli.main(["example", str(folder)]) == 0
+    code, out, _ = command(capsys, "example", folder)
+    assert code == 0
     copied = {name: path.read_bytes() for name, path in files_of(folder).items()}
     assert copied == {name: path.read_bytes() for name, path in files_of(FILES).items()}
     assert sum(map(len, copied.values())) < MOST_BYTES
-    out = capsys.readouterr().out
     assert f"cd '{folder}'" in out
     for word in re.findall(r"[\w/]*(?:shoulder|bench)[\w/.]*", out):
         assert (folder / word).exists() or word == "bench.html", word
@@ -45,28 +45,20 @@ def test_every_file_is_copied_and_the_next_words_name_them(tmp_path, capsys, mad
 
 def test_without_a_name_the_folder_is_pamrs_example(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["example"]) == 0
+    assert "cd pamrs-example" in command(capsys, "example")[1]
     assert (tmp_path / "pamrs-example" / "example.ipynb").exists()
-    assert "cd pamrs-example" in capsys.readouterr().out
 
 
-def test_a_folder_with_something_in_it_is_left_alone(tmp_path, capsys):
-    (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
-    assert cli.main(["example", str(tmp_path)]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err == (
-        f"pamrs: error: {tmp_path}: the folder is not empty; give another one "
-        "(pamrs example FOLDER)\n"
-    )
+def test_what_is_there_is_left_alone(tmp_path, capsys):
+    file = tmp_path / "mine.txt"
+    file.write_text("mine", encoding="utf-8")
+    said = f"{tmp_path}: the folder is not empty; give another one (pamrs example FOLDER)\n"
+    assert command(capsys, "example", tmp_path) == (2, "", f"pamrs: error: {said}")
+    code, _, err = command(capsys, "example", file)
+    assert code == 2
+    assert "mine.txt" in err
     assert list(files_of(tmp_path)) == ["mine.txt"]
-
-
-def test_a_file_is_no_folder(tmp_path, capsys):
-    (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
-    assert cli.main(["example", str(tmp_path / "mine.txt")]) == 2
-    assert "mine.txt" in capsys.readouterr().err
-    assert (tmp_path / "mine.txt").read_text(encoding="utf-8") == "mine"
+    assert file.read_text(encoding="utf-8") == "mine"
 
 
 def numbers(path):

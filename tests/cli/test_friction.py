@@ -6,7 +6,6 @@ import re
 import numpy as np
 import pytest
 
-from pamrs import cli
 from pamrs.fit import fit_friction, load_force_map
 from pamrs.rig import Muscle
 from tests.scripts import command
@@ -41,32 +40,20 @@ def frictional():
 
 def rows(count, noise):
     """Length [mm], pressure [kPa], force [N] and direction of one loop at every level."""
-    muscle = frictional()
-    rng = np.random.default_rng(3)
+    muscle, rng = frictional(), np.random.default_rng(3)
     e, way = cycle(count)
-    loops = [
-        [
-            REST * (1 - e) * 1e3,
-            0 * e + p / 1e3,
-            muscle.force(p, e, direction=way) + noise * rng.normal(size=e.size),
-            way,
-        ]
-        for p in LEVELS
-    ]
-    return np.concatenate([np.column_stack(loop) for loop in loops])
+    loops = []
+    for p in LEVELS:
+        force = muscle.force(p, e, direction=way) + noise * rng.normal(size=e.size)
+        loops.append(np.column_stack([REST * (1 - e) * 1e3, 0 * e + p / 1e3, force, way]))
+    return np.concatenate(loops)
 
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory):
     path = tmp_path_factory.mktemp("loops") / "loops.csv"
-    np.savetxt(
-        path,
-        rows(40, 2.0),
-        delimiter=",",
-        header="length [mm],pressure [kPa],force [N],direction",
-        comments="",
-        fmt="%.10g",
-    )
+    header = "length [mm],pressure [kPa],force [N],direction"
+    np.savetxt(path, rows(40, 2.0), delimiter=",", header=header, comments="", fmt="%.10g")
     return path
 
 
@@ -120,35 +107,40 @@ def test_it_prints_and_writes_what_the_function_gives(capsys, table, tmp_path):
 def test_the_muscle_may_be_named_or_given_in_full(capsys, table):
     alone = run(capsys, table, *OPTIONS)[1]
     assert run(capsys, table, "--muscle", "pam_a_1in")[1] == alone
-    sizes = [
-        "--rest-diameter",
-        "25.4 mm",
-        "--braid-angle",
-        "73.5 deg",
-        "--wall-thickness",
-        "3.175 mm",
-    ]
-    assert run(capsys, table, *OPTIONS, *sizes)[1] == alone
+    sizes = ("--rest-diameter", "25.4 mm", "--braid-angle", "73.5 deg", "--wall-thickness")
+    assert run(capsys, table, *OPTIONS, *sizes, "3.175 mm")[1] == alone
+
+
+DESCRIBED = """schema = "pamrs.force_map/1"
+name = "loops"
+file = "{table}"
+[muscle]
+rest_length = {{ value = 276, unit = "mm" }}
+rest_diameter = {{ value = 25.4, unit = "mm" }}
+braid_angle = {{ value = 73.5, unit = "deg" }}
+wall_thickness = {{ value = 3.175, unit = "mm" }}
+"""
 
 
 def test_a_description_brings_its_muscle(capsys, table):
-    sizes = {
-        "rest_length": (276, "mm"),
-        "rest_diameter": (25.4, "mm"),
-        "braid_angle": (73.5, "deg"),
-        "wall_thickness": (3.175, "mm"),
-    }
-    text = 'schema = "pamrs.force_map/1"\nname = "loops"\nfile = "loops.csv"\n[muscle]\n'
-    text += "".join(
-        f'{name} = {{ value = {value}, unit = "{unit}" }}\n'
-        for name, (value, unit) in sizes.items()
-    )
     path = table.with_name("loops.toml")
-    path.write_text(text, encoding="utf-8")
+    path.write_text(DESCRIBED.format(table=table.name), encoding="utf-8")
     assert run(capsys, path)[1] == run(capsys, table, *OPTIONS)[1]
     code, _, err = run(capsys, path, *OPTIONS)
     assert code == 2
     assert "--rest-length cannot be given" in err
+
+
+@pytest.mark.parametrize("fit", ["friction", "muscle", "map"])
+def test_a_table_outside_a_description_needs_to_be_allowed(capsys, table, tmp_path, fit):
+    described = tmp_path / "map.toml"
+    described.write_text(DESCRIBED.format(table=table.as_posix()), encoding="utf-8")
+    code, _, err = command(capsys, "fit", fit, described)
+    assert code != 0
+    assert "lies outside the folder of the description" in err
+    code, out, _ = command(capsys, "fit", fit, described, "--allow-outside")
+    assert code == 0
+    assert out.startswith("loops: ")
 
 
 @pytest.mark.parametrize(
@@ -175,25 +167,3 @@ def test_missing_files_and_folders_are_named(capsys, table):
     code, _, err = run(capsys, table, *OPTIONS, "--png", "no_folder/x.png")
     assert code == 2
     assert "folder no_folder does not exist" in err
-
-
-DESCRIBED = """schema = "pamrs.force_map/1"
-file = "{table}"
-[muscle]
-model = "robinson"
-rest_length = {{ value = 276, unit = "mm" }}
-rest_diameter = {{ value = 25.4, unit = "mm" }}
-braid_angle = {{ value = 73.5, unit = "deg" }}
-wall_thickness = {{ value = 3.175, unit = "mm" }}
-"""
-
-
-@pytest.mark.parametrize("fit", ["friction", "muscle", "map"])
-def test_a_table_outside_a_description_needs_to_be_allowed(capsys, table, tmp_path, fit):
-    described = tmp_path / "map.toml"
-    described.write_text(DESCRIBED.format(table=table.as_posix()), encoding="utf-8")
-    words = ["fit", fit, str(described)]
-    assert cli.main(words) != 0
-    assert "lies outside the folder of the description" in capsys.readouterr().err
-    assert cli.main([*words, "--allow-outside"]) == 0
-    assert capsys.readouterr().out.startswith("map: ")

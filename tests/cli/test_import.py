@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +18,19 @@ from tests.recordings.written import written
 from tests.scripts import command
 
 
-def run(capsys: pytest.CaptureFixture[str], *arguments: Any) -> tuple[int, str, str]:
-    return command(capsys, "import", *arguments)
+@pytest.fixture
+def run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., tuple[int, str, str]]:
+    """The command, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return partial(command, capsys, "import")
 
 
-def test_a_log_becomes_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_log_becomes_a_case(tmp_path: Path, run: Any) -> None:
     file, _, _ = written(tmp_path, "mf4")
     before = file.read_bytes()
-    code, out, err = run(capsys, file, "--rig", "shoulder", "--out", tmp_path / "case")
+    code, out, err = run(file, "--rig", "shoulder", "--out", tmp_path / "case")
     assert code == 0
     assert "400      100 Hz  bar" in out
     assert "not found in this log: supply_pressure" in out
@@ -32,14 +39,14 @@ def test_a_log_becomes_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     found = load_case(tmp_path / "case", allow_outside=True)
     assert found.channels == ("valve_command", "muscle_pressure", "joint_angle")
     assert (found.rig.name, file.read_bytes()) == ("shoulder", before)
-    code, _, err = run(capsys, file, "--out", tmp_path / "case")
+    code, _, err = run(file, "--out", tmp_path / "case")
     assert (code, "not overwritten" in err) == (2, True)
 
 
-def test_a_rig_file_is_pointed_at(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_rig_file_is_pointed_at(tmp_path: Path, run: Any) -> None:
     file, _, _ = written(tmp_path, "bag")
     pamrs.rigs.shoulder().to_toml(tmp_path / "mine.toml")
-    code, _, _ = run(capsys, file, "--rig", tmp_path / "mine.toml", "--out", tmp_path / "a" / "b")
+    code, _, _ = run(file, "--rig", tmp_path / "mine.toml", "--out", tmp_path / "a" / "b")
     assert code == 0
     text = (tmp_path / "a" / "b" / "case.toml").read_text(encoding="utf-8")
     assert 'rig = "../../mine.toml"' in text
@@ -48,13 +55,11 @@ def test_a_rig_file_is_pointed_at(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize("kind", ["mf4", "bag"])
-def test_copies_make_the_case_complete(
-    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_copies_make_the_case_complete(kind: str, tmp_path: Path, run: Any) -> None:
     file, _, _ = written(tmp_path, kind)
     pamrs.rigs.shoulder().to_toml(tmp_path / "mine.toml")
     words = [file, "--rig", tmp_path / "mine.toml", "--out", tmp_path / "case", "--copy"]
-    code, out, err = run(capsys, *words)
+    code, out, err = run(*words)
     assert code == 0, err
     assert "--allow-outside" not in out + err
     assert file.exists()
@@ -67,32 +72,27 @@ def test_copies_make_the_case_complete(
     assert "muscle_pressure" in found.channels
 
 
-def test_a_case_that_is_printed_minds_no_rig_file_here(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_case_that_is_printed_minds_no_rig_file_here(tmp_path: Path, run: Any) -> None:
     file, _, _ = written(tmp_path, "mf4")
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "rig.toml").write_text("mine")
-    code, out, err = run(capsys, file, "--rig", "shoulder")
+    code, out, err = run(file, "--rig", "shoulder")
     assert code == 0, err
     assert 'rig = "rig.toml"' in out
 
 
-def test_a_copy_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_copy_overwrites_nothing(tmp_path: Path, run: Any) -> None:
     file, _, _ = written(tmp_path, "mf4")
     (tmp_path / "case").mkdir()
     (tmp_path / "case" / file.name).write_text("mine")
-    code, _, err = run(capsys, file, "--rig", "shoulder", "--out", tmp_path / "case", "--copy")
+    code, _, err = run(file, "--rig", "shoulder", "--out", tmp_path / "case", "--copy")
     assert (code, "not overwritten" in err) == (2, True)
     assert (tmp_path / "case" / file.name).read_text() == "mine"
     assert not (tmp_path / "case" / "case.toml").exists()
-    code, _, err = run(capsys, file, "--rig", "shoulder", "--copy")
+    code, _, err = run(file, "--rig", "shoulder", "--copy")
     assert (code, "--out" in err) == (2, True)
 
 
-def test_a_copy_follows_no_link_and_leaves_nothing_half_done(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_copy_follows_no_link_and_leaves_nothing_half_done(tmp_path: Path, run: Any) -> None:
     file, _, _ = written(tmp_path, "mf4")
     case, precious = tmp_path / "case", tmp_path / "precious"
     case.mkdir()
@@ -102,16 +102,16 @@ def test_a_copy_follows_no_link_and_leaves_nothing_half_done(
     other = tmp_path / "b" / file.name.upper()
     other.write_bytes(file.read_bytes())
     words = ["--rig", "shoulder", "--out", case, "--copy"]
-    code, _, err = run(capsys, file, other, *words)
+    code, _, err = run(file, other, *words)
     assert (code, "rename one" in err) == (2, True)
-    code, _, err = run(capsys, file, tmp_path / "b" / ".." / file.name, *words)
+    code, _, err = run(file, tmp_path / "b" / ".." / file.name, *words)
     assert (code, "the same log twice" in err) == (2, True)
     assert {path.name for path in case.iterdir()} == {f"{file.name}.part"}
-    assert run(capsys, file, *words)[0] == 0
+    assert run(file, *words)[0] == 0
     assert precious.read_text() == "mine"
     assert not (case / file.name).is_symlink()
     bag, _, _ = written(tmp_path, "bag")
-    code, _, err = run(capsys, bag, "--rig", "shoulder", "--out", bag / "case", "--copy")
+    code, _, err = run(bag, "--rig", "shoulder", "--out", bag / "case", "--copy")
     assert (code, "which is to be copied there" in err) == (2, True)
     assert not (bag / "case").exists()
 
@@ -127,22 +127,14 @@ LAYOUTS = [
 
 
 @pytest.mark.parametrize(("log", "rig", "out"), LAYOUTS)
-def test_what_it_tells_to_run_next_takes_the_case(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    log: str,
-    rig: str,
-    out: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_what_it_tells_to_run_next_takes_the_case(run: Any, log: str, rig: str, out: str) -> None:
     Path("my logs").mkdir()
     rows = "".join(f"{0.01 * i:.2f};{i % 9 / 8:.3f};{20 + i}\n" for i in range(60))
     Path("my logs/run 1.csv").write_text(f"t [s];p_muscle [bar];angle [deg]\n{rows}")
     Path("link.csv").symlink_to("my logs/run 1.csv")
     Path("alias").symlink_to("my logs")
     pamrs.rigs.shoulder().to_toml("my rig.toml")
-    code, said, _ = run(capsys, log, "--rig", rig, "--out", out)
+    code, said, _ = run(log, "--rig", rig, "--out", out)
     assert code == 0
     command = said.rpartition("then: ")[2].strip()
     _, _, folder, *options = shlex.split(command)
@@ -150,46 +142,32 @@ def test_what_it_tells_to_run_next_takes_the_case(
     assert len(found.recordings[0]) == 60
 
 
-def test_no_rig_and_another_rig_are_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_no_rig_and_another_rig_are_told(tmp_path: Path, run: Any) -> None:
     np.savez("run.npz", **{"p1 [bar]": np.linspace(0.0, 4.0, 100), "t [s]": np.arange(100) * 0.01})
-    code, out, _ = run(capsys, "run.npz", "--out", "case")
+    code, out, _ = run("run.npz", "--out", "case")
     assert (code, "put the rig file there as case/rig.toml, then: pamrs" in out) == (0, True)
     pamrs.rigs.bench().to_toml("rig.toml")
     before = Path("rig.toml").read_bytes()
-    code, _, err = run(capsys, "run.npz", "--rig", "shoulder", "--out", ".")
+    code, _, err = run("run.npz", "--rig", "shoulder", "--out", ".")
     assert (code, "is there already, and is not shoulder" in err) == (2, True)
     assert (Path("rig.toml").read_bytes(), Path("case.toml").exists()) == (before, False)
 
 
-def test_without_a_folder_it_is_printed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_without_a_folder_it_is_printed(tmp_path: Path, run: Any) -> None:
     np.savez("run.npz", p1=np.linspace(0.0, 4.0, 100))
-    code, out, _ = run(capsys, "run.npz", "--sample-time", "5 ms")
+    code, out, _ = run("run.npz", "--sample-time", "5 ms")
     assert code == 0
     assert 'schema = "pamrs.case/1"' in out
     assert "sample_time = 0.005" in out
     assert list(tmp_path.iterdir()) == [tmp_path / "run.npz"]
 
 
-def test_columns_without_headings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_columns_without_headings(tmp_path: Path, run: Any) -> None:
     rows = "".join(f"{10 * i};{i % 9 / 8:.3f};{i}\n" for i in range(60))
     (tmp_path / "run.csv").write_text(rows, encoding="utf-8")
     names = "time [ms], muscle_pressure [bar], n"
-    code, out, _ = run(
-        capsys,
-        tmp_path / "run.csv",
-        "--columns",
-        names,
-        "--rig",
-        "sealed_chamber",
-        "--out",
-        tmp_path,
-    )
+    words = ["--columns", names, "--rig", "sealed_chamber", "--out", tmp_path]
+    code, out, _ = run(tmp_path / "run.csv", *words)
     assert (code, "100 Hz" in out) == (0, True)
     (only,) = load_case(tmp_path).recordings
     assert (len(only), only.sample_time) == (60, 0.01)
@@ -205,26 +183,19 @@ def test_columns_without_headings(tmp_path: Path, capsys: pytest.CaptureFixture[
         (["nothing.npz"], "no channel was recognised"),
     ],
 )
-def test_wrong_input(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    words: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_wrong_input(run: Any, arguments: list[str], words: str) -> None:
     np.savez("run.npz", p1=np.linspace(0.0, 4.0, 100))
     np.savez("nothing.npz", zzz=np.linspace(0.0, 4.0, 100))
-    code, _, err = run(capsys, *arguments)
+    code, _, err = run(*arguments)
     assert code == 2
     assert words in err
 
 
 def test_the_extra_is_named_before_anything_is_read(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file, _, _ = written(tmp_path, "hdf5")
     monkeypatch.setattr(logs_package, "find_spec", lambda name: None)
-    code, out, err = run(capsys, file)
+    code, out, err = run(file)
     assert (code, out) == (2, "")
     assert "pip install 'pamrs[logs]'" in err

@@ -43,11 +43,8 @@ def test_library_lists_every_muscle_with_its_pressure_and_mass(capsys):
         assert words[0] == name
         assert float(words[1]) == pytest.approx(item.max_pressure / 1e5, rel=1e-4)
         assert words[2] == "bar"
-        assert (
-            words[3] == "unknown"
-            if item.mass is None
-            else float(words[3]) == pytest.approx(item.mass, rel=1e-4)
-        )
+        mass = None if words[3] == "unknown" else pytest.approx(float(words[3]), rel=1e-4)
+        assert item.mass == mass
         assert item.title in out
 
 
@@ -58,15 +55,13 @@ def test_a_muscle_is_shown_with_the_origin_of_each_number(capsys, name):
     assert code == 0
     for key, origin in item.origins.items():
         assert origin in " ".join(line_of(out, f"{key} "))
-    assert float(line_of(out, "rest_length")[1]) == pytest.approx(
-        1e3 * item.parameters["rest_length"], rel=1e-4
-    )
-    assert float(line_of(out, "braid_angle")[1]) == pytest.approx(
-        np.degrees(item.parameters["braid_angle"]), rel=1e-4
-    )
-    assert float(line_of(out, "modulus_offset")[1].rstrip(",")) == pytest.approx(
-        item.parameters["modulus_offset"][0] / 1e6, rel=1e-4
-    )
+    own = item.parameters
+    for key, value in (
+        ("rest_length", 1e3 * own["rest_length"]),
+        ("braid_angle", np.degrees(own["braid_angle"])),
+        ("modulus_offset", own["modulus_offset"][0] / 1e6),
+    ):
+        assert float(line_of(out, key)[1].rstrip(",")) == pytest.approx(value, rel=1e-4)
     rows = compare(name)
     for row in rows:
         assert f"{row.fact} " in out
@@ -84,9 +79,8 @@ def test_the_rig_of_a_muscle_has_that_muscle(capsys, tmp_path, name):
     rig = load_rig(path)
     assert rig.name == name
     assert rig.muscle.parameters == library.entry(name).muscle.parameters
-    assert rig.parameter("chamber.dead_volume").value == pytest.approx(
-        0.1 * float(rig.muscle.air_volume(0.0))
-    )
+    volume = 0.1 * float(rig.muscle.air_volume(0.0))
+    assert rig.parameter("chamber.dead_volume").value == pytest.approx(volume)
 
 
 @pytest.mark.parametrize(
@@ -148,9 +142,8 @@ def test_a_rig_file_is_a_candidate_at_a_pressure(capsys, tmp_path):
     code, out, _ = run(capsys, "size", *POINTS, path, "pam_a_1in", "--pressure", "11 bar")
     assert code == 0
     assert line_of(out, "blocked force")[3] == line_of(out, "blocked force")[4]
-    assert_refused(
-        capsys, ["size", *POINTS, path], [f"MUSCLE = '{path}' is a rig file", "give --pressure"]
-    )
+    parts = [f"MUSCLE = '{path}' is a rig file", "give --pressure"]
+    assert_refused(capsys, ["size", *POINTS, path], parts)
 
 
 def test_a_pressure_beyond_the_tests_is_said(capsys):
@@ -163,10 +156,8 @@ def test_what_is_not_feasible_is_printed_with_its_reason(capsys, tmp_path):
     path = tmp_path / "size.json"
     code, out, _ = run(capsys, "size", "--point", "30 cm:9 N", "elbow_0625in", "--json", path)
     assert code == 0
-    assert (
-        "elbow_0625in: not feasible: it would contract by 1.517, beyond the braid's limit 0.392"
-        in out
-    )
+    told = "not feasible: it would contract by 1.517, beyond the braid's limit 0.392"
+    assert f"elbow_0625in: {told}" in out
     assert "count" not in out
     assert json.loads(path.read_text(encoding="utf-8"))["rows"] == []
     code, out, _ = run(capsys, "size", *POINTS, *PAIR, "--max-count", 3)

@@ -5,7 +5,9 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import pamrs
@@ -14,23 +16,25 @@ import pamrs.recordings
 from pamrs import _writing, cli
 from pamrs._writing import check_writable, write_atomically
 from pamrs.errors import ParameterError
+from pamrs.findings import Protocol
 from tests.scripts import command as run
 
 
 class Done:
-    """Stands in for a finished diagnosis."""
+    """Stands in for a finished diagnosis, which takes many seconds."""
 
     model = 'name = "x"\n'
     rig = None
 
     class next_experiment:
+        excitation: dict = {}
         protocol = None
 
     def summary(self):
         return "verdict: none"
 
-    def to_json(self, path):
-        return write_atomically(path, "{}\n")
+    def to_json(self, path=None):
+        return "{}\n" if path is None else write_atomically(path, "{}\n")
 
     def report(self, path):
         return write_atomically(path, "<html>")
@@ -43,19 +47,62 @@ class Done:
 
 
 @pytest.fixture
-def diagnosed(monkeypatch, tmp_path):
+def loaded(tmp_path):
+    """Stands in for a case."""
+    return SimpleNamespace(name="a case", path=tmp_path, recordings=())
+
+
+@pytest.fixture
+def diagnosed(monkeypatch, loaded):
     """A diagnosis that is done at once; how often it was asked for."""
-
-    class Loaded:
-        name = "a case"
-        path = tmp_path
-
     asked = []
-    monkeypatch.setattr(pamrs.recordings, "load_case", lambda *given, **options: Loaded())
+    monkeypatch.setattr(pamrs.recordings, "load_case", lambda *given, **options: loaded)
     monkeypatch.setattr(
         pamrs.diagnosis, "diagnose", lambda case, **options: asked.append(case) or Done()
     )
     return asked
+
+
+@pytest.mark.usefixtures("diagnosed")
+def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, loaded):
+    options = ("report", "json", "pdf", "png", "model")
+    paths = {word: tmp_path / f"out.{word}" for word in options}
+    words = [part for word, path in paths.items() for part in (f"--{word}", path)]
+    code, out, err = run(capsys, "diagnose", tmp_path, *words)
+    assert (code, out) == (0, "verdict: none\n")
+    assert "diagnosing a case" in err
+    for path in paths.values():
+        assert path.stat().st_size > 0
+        assert str(path) in err
+    told = run(capsys, "diagnose", tmp_path, "--json", "-", "--quiet")
+    assert told == (0, "{}\n", "")
+
+
+@pytest.mark.usefixtures("diagnosed")
+def test_the_next_experiment_is_written_and_held_against_what_was_recorded(
+    capsys, tmp_path, loaded, monkeypatch
+):
+    volts = {"valve_command": np.full(3, 5.0)}
+    protocol = Protocol("staircase", np.arange(3) * 0.1, volts, {"valve_command": "V"})
+    monkeypatch.setattr(Done.next_experiment, "protocol", protocol)
+    file = tmp_path / "next.csv"
+
+    def said(*recorded):
+        loaded.recordings = [SimpleNamespace(channels={"valve_command": np.array(recorded)})]
+        code, _, err = run(capsys, "diagnose", tmp_path, "--experiment", file)
+        assert code == 0
+        return err
+
+    assert "goes from" not in said(4.0, np.nan, 4.9)  # within 5 % of what was recorded
+    commands = file.read_text(encoding="utf-8").splitlines()
+    assert commands == ["time [s],valve_command [V]", "0,5", "0.1,5", "0.2,5"]
+    told = "valve_command goes from 5.0 V to 5.0 V, and was recorded from 4.0 V to 4.0 V"
+    assert told in said(4.0, 4.0)
+    # where there is nothing to play, that is said in the place of a file
+    monkeypatch.setattr(Done.next_experiment, "protocol", None)
+    file = tmp_path / "absent.csv"
+    assert f"not written: {file}: no experiment is proposed" in said(4.0)
+    assert not file.exists()
 
 
 @pytest.mark.parametrize(

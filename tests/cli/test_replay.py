@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs import cli
-from tests.scripts import command as run
 
 DT = 0.01
 
@@ -27,9 +26,9 @@ def case(tmp_path: Path) -> Path:
     for k, (name, role) in enumerate((("waves", "fit"), ("steps", "held_out"))):
         time = np.arange(0.0, 4.0, DT)
         command = 5.0 + 0.5 * np.sin((2.0 + k) * time)
-        run = pamrs.simulate(true, command, sample_time=DT)
+        made = pamrs.simulate(true, command, sample_time=DT)
         columns = ("supply_pressure", "muscle_pressure", "joint_angle")
-        table = np.column_stack([time, command, *(run[c] for c in columns)])
+        table = np.column_stack([time, command, *(made[c] for c in columns)])
         units = ("time [s]", "valve_command [V]", "supply_pressure [Pa]", "muscle_pressure [Pa]")
         header = ",".join([*units, "joint_angle [rad]"])
         np.savetxt(folder / f"{name}.csv", table, delimiter=",", header=header, comments="")
@@ -39,11 +38,9 @@ def case(tmp_path: Path) -> Path:
     return folder
 
 
-def test_errors_of_the_nominal_rig_stand_beside_those_of_the_model(
-    capsys: pytest.CaptureFixture[str], case: Path
-) -> None:
+def test_errors_of_the_nominal_rig_stand_beside_those_of_the_model(run: Any, case: Path) -> None:
     plot = case.parent / "out.png"
-    code, out, _ = run(capsys, "replay", case.parent / "model.toml", "--plot", plot)
+    code, out, _ = run("replay", case.parent / "model.toml", "--plot", plot)
     assert code == 0
     assert re.findall(r"^(\w+) \(", out, re.MULTILINE) == ["waves", "steps"]
     errors = re.findall(r"muscle_pressure: rms difference (\S+) -> (\S+) bar", out)
@@ -56,7 +53,7 @@ def test_errors_of_the_nominal_rig_stand_beside_those_of_the_model(
 
 
 def test_the_picture_has_recorded_rig_file_and_model_in_units_of_the_laboratory(
-    case: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    run: Any, case: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     figure = pytest.importorskip("matplotlib.figure").Figure
     drawn = []
@@ -64,10 +61,7 @@ def test_the_picture_has_recorded_rig_file_and_model_in_units_of_the_laboratory(
     monkeypatch.setattr(
         figure, "savefig", lambda self, *a, **k: (drawn.append(self), save(self, *a, **k))
     )
-    assert (
-        cli.main(["replay", str(case.parent / "model.toml"), "--plot", str(tmp_path / "a.png")])
-        == 0
-    )
+    assert run("replay", case.parent / "model.toml", "--plot", tmp_path / "a.png")[0] == 0
     panels = {axes.get_title("left"): axes for axes in drawn[0].axes}
     assert [axes.get_ylabel() for axes in panels.values()] == ["V", "bar", "deg", "N m", "N"]
     labels = [line.get_label() for line in panels["joint angle"].lines]
@@ -76,53 +70,45 @@ def test_the_picture_has_recorded_rig_file_and_model_in_units_of_the_laboratory(
     assert pressures == ["recorded", "rig file", "supply model", "muscle model"]
 
 
-def test_one_recording_with_the_rig_of_the_case(
-    capsys: pytest.CaptureFixture[str], case: Path
-) -> None:
-    code, out, _ = run(capsys, "replay", case, "--recording", "steps")
+def test_one_recording_with_the_rig_of_the_case(run: Any, case: Path) -> None:
+    code, out, _ = run("replay", case, "--recording", "steps")
     assert code == 0
     assert out.startswith("steps (held out")
     assert "waves" not in out
     assert "->" not in out
 
-
-def test_a_recording_that_is_not_there_is_named(
-    capsys: pytest.CaptureFixture[str], case: Path
-) -> None:
-    code, _, err = run(capsys, "replay", case, "--recording", "ramps")
+    code, _, err = run("replay", case, "--recording", "ramps")
     assert code == 2
     assert "--recording = 'ramps' is not allowed: one of 'waves', 'steps' is needed" in err
 
 
 def test_a_model_away_from_its_case_says_where_that_was_looked_for(
-    capsys: pytest.CaptureFixture[str], case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Any, case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model, moved = tmp_path / "model.toml", tmp_path / "elsewhere" / "model.toml"
     moved.parent.mkdir()
     moved.write_bytes(model.read_bytes())
-    code, _, err = run(capsys, "replay", moved)
+    code, _, err = run("replay", moved)
     assert code == 2
     assert f"case = 'case': there is no folder {moved.parent / 'case'}; give the folder" in err
     assert "CASE --rig FILE" in err
     monkeypatch.chdir(moved.parent)  # as that line says, from anywhere
-    code, out, _ = run(capsys, "replay", case, "--rig", "model.toml")
+    code, out, _ = run("replay", case, "--rig", "model.toml")
     assert code == 0
-    assert out == run(capsys, "replay", model)[1]
+    assert out == run("replay", model)[1]
 
 
 @pytest.mark.parametrize("name", pamrs.rigs.names())
-def test_a_rig_of_the_package_is_no_case(
-    capsys: pytest.CaptureFixture[str], case: Path, tmp_path: Path, name: str
-) -> None:
-    code, _, err = run(capsys, "replay", name)
+def test_a_rig_of_the_package_is_no_case(run: Any, case: Path, tmp_path: Path, name: str) -> None:
+    code, _, err = run("replay", name)
     assert code == 2
     assert f"{name} is a rig of the package, not a case; give the folder of a case" in err
     pamrs.rigs.named(name).to_toml(tmp_path / "alone.toml")
-    code, _, err = run(capsys, "replay", tmp_path / "alone.toml")
+    code, _, err = run("replay", tmp_path / "alone.toml")
     assert code == 2
     assert "does not say from which case it is; give the folder of the case" in err
     pamrs.rigs.named(name).with_case(str(case)).to_toml(tmp_path / "alone.toml")
-    code, out, err = run(capsys, "replay", tmp_path / "alone.toml")
+    code, out, err = run("replay", tmp_path / "alone.toml")
     assert code == 0  # one that takes other inputs says so
     assert out.count("rms difference") >= 2
     said = f"{name} cannot be run:" in err or f"{name} has none of the channels" in err

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from io import StringIO
 
 import pytest
 import typer
@@ -12,6 +11,8 @@ import typer
 from pamrs import cli, library, rigs
 from pamrs.cli import _shared
 from pamrs.effects import CATALOGUE
+from tests.cli.test_terminal import Terminal
+from tests.scripts import command
 
 LIFT = ["lift", "elbow", "--pressure", "8 bar"]
 
@@ -40,41 +41,31 @@ def test_every_command_can_be_quiet_and_says_what_its_options_are(name):
 
 def test_json_goes_to_standard_output_alone(capsys, tmp_path):
     file = tmp_path / "a.json"
-    assert cli.main([*LIFT, "--json", str(file)]) == 0
-    text = capsys.readouterr().out
-    assert cli.main([*LIFT, "--json", "-"]) == 0
-    said = capsys.readouterr()
-    assert json.loads(said.out) == json.loads(file.read_text(encoding="utf-8"))
-    assert said.err == text
-    assert cli.main([*LIFT, "--json", "-", "--quiet"]) == 0
-    quiet = capsys.readouterr()
-    assert (quiet.out, quiet.err) == (said.out, "")
+    _, text, err = command(capsys, *LIFT, "--json", file)
+    assert f"written: {file}" in err
+    code, out, err = command(capsys, *LIFT, "--json", "-")
+    assert json.loads(out) == json.loads(file.read_text(encoding="utf-8"))
+    assert (code, err) == (0, text)
+    assert command(capsys, *LIFT, "--json", "-", "--quiet") == (0, out, "")
 
 
 def test_quiet_leaves_out_notes_and_keeps_errors(capsys, tmp_path):
     picture = tmp_path / "lift.png"
-    assert cli.main([*LIFT, "--png", str(picture), "-q"]) == 0
-    said = capsys.readouterr()
-    assert said.err == ""
-    assert "elbow" in said.out
+    code, out, err = command(capsys, *LIFT, "--png", picture, "-q")
+    assert (code, err) == (0, "")
+    assert "elbow" in out
     assert picture.exists()
-    assert cli.main(["lift", "no_such_rig", "-q"]) == 2
-    assert "no_such_rig" in capsys.readouterr().err
-    assert cli.main([*LIFT, "--png", str(picture)]) == 0
-    assert "written: " in capsys.readouterr().err
+    code, _, err = command(capsys, "lift", "no_such_rig", "-q")
+    assert code == 2
+    assert "no_such_rig" in err
 
 
 @pytest.mark.parametrize(
     ("name", "value", "plain"), [("NO_COLOR", "1", True), ("TERM", "dumb", True), ("X", "1", False)]
 )
 def test_a_plain_terminal_gets_plain_lines(monkeypatch, name, value, plain):
-    class Terminal(StringIO):
-        def isatty(self):
-            return True
-
     terminal = Terminal()
-    for other in ("NO_COLOR", "TERM"):
-        monkeypatch.delenv(other, raising=False)
+    monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv(name, value)
     monkeypatch.setattr(sys, "stderr", terminal)

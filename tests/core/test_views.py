@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import base64
 import re
-import subprocess
-import sys
 from functools import cache
 from typing import Any
 
@@ -28,6 +26,13 @@ STEP = trajectories.step(*trajectories.degrees(15, 30), duration=0.5)
 
 def _simulation() -> Any:
     return pamrs.simulate(RIG, 5.6, sample_time=5e-3, duration=0.5)
+
+
+def _batch(**wanted: Any) -> Any:
+    plants = {"arm.payload": [0.5, 1.0]}
+    return pamrs.simulate_batch(
+        RIG, 5.6, sample_time=5e-3, duration=0.2, parameters=plants, **wanted
+    )
 
 
 def _case() -> Any:
@@ -63,22 +68,8 @@ MAKERS = {
     "case": _case,
     "recording": lambda: _case().recordings[0],
     "simulation": _simulation,
-    "batch": lambda: pamrs.simulate_batch(
-        RIG,
-        5.6,
-        sample_time=5e-3,
-        duration=0.2,
-        parameters={"arm.payload": [0.5, 1.0]},
-        record=["joint_angle"],
-    ),
-    "reduced": lambda: pamrs.simulate_batch(
-        RIG,
-        5.6,
-        sample_time=5e-3,
-        duration=0.2,
-        parameters={"arm.payload": [0.5, 1.0]},
-        reduce={"highest": ("max", "joint_angle")},
-    ),
+    "batch": lambda: _batch(record=["joint_angle"]),
+    "reduced": lambda: _batch(reduce={"highest": ("max", "joint_angle")}),
     "loop": lambda: closed_loop(RIG, PID(1.4, 0.5, period=5e-3), STEP),
     "gain map": _gains,
     "muscle fit": lambda: pamrs.fit.fit_muscle(_map(), RIG.muscle),
@@ -166,16 +157,10 @@ def test_a_result_of_a_file_has_its_table_and_no_picture(tmp_path: Any) -> None:
         read.plot()
 
 
-def test_names_are_escaped_and_matplotlib_waits_until_it_is_asked() -> None:
+def test_names_are_escaped() -> None:
     rig = pamrs.rigs.shoulder()
     object.__setattr__(rig, "name", "<b>bold</b>")
     assert "<b>bold" not in rig._repr_html_()
-    code = (
-        "import sys, pamrs; rig = pamrs.rigs.shoulder();"
-        "pamrs.simulate(rig, 5.0, sample_time=0.01, duration=0.1);"
-        "sys.exit('matplotlib' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_names_are_no_formulas_and_extremes_are_drawn() -> None:

@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 import pamrs
+from pamrs._arrays import solve_normal
 from pamrs._losses import STRICT, Losses
-from pamrs._normal import solve_normal
 from pamrs.diagnosis.evidence import _candidates
 from pamrs.diagnosis.explain import _assemble
 from pamrs.diagnosis.model import _conclude

@@ -4,6 +4,8 @@ are tested in the core.
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +15,7 @@ import pamrs
 from pamrs import _core
 from pamrs.control.linear import linearise
 from pamrs.diagnosis.fit import same_data_in, starts_of
-from pamrs.effects import CATALOGUE, EFFECTS, Term
+from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, Form, Term
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
 from pamrs.rig.schema import ACTS
@@ -60,30 +62,6 @@ def by_blocks(rig: pamrs.Rig) -> dict[str, np.ndarray]:
     return channels
 
 
-@pytest.mark.parametrize("effect", sorted(EFFECTS))
-def test_an_effect_survives_its_file_and_runs(effect: str) -> None:
-    rig = rig_for(effect).with_effect(effect)
-    again = parse_rig(rig.to_toml_text())
-    assert again.effects == rig.effects
-    one, two = run(rig), run(again)
-    for channel in one:
-        np.testing.assert_array_equal(one[channel], two[channel])
-    assert all(np.isfinite(one[channel]).all() for channel in one)
-
-
-@pytest.mark.parametrize("effect", sorted(e for e in EFFECTS if EFFECTS[e].neutral()))
-def test_its_neutral_values_switch_it_off(effect: str) -> None:
-    plain = rig_for(effect)
-    off = plain.with_effect(effect, EFFECTS[effect].neutral())
-    one, two = by_blocks(plain), run(off)
-    for channel in one:
-        np.testing.assert_array_equal(one[channel], two[channel])
-
-
-def test_one_effect_has_no_neutral_value() -> None:
-    assert [e for e in EFFECTS if not EFFECTS[e].neutral()] == ["heat_transfer"]
-
-
 @pytest.mark.parametrize("supply", ["tank", "regulator"])
 def test_all_at_once_run_and_restart_bit_for_bit(supply: str) -> None:
     rig = with_outlet() if supply == "tank" else regulated()
@@ -99,65 +77,56 @@ def test_all_at_once_run_and_restart_bit_for_bit(supply: str) -> None:
         np.testing.assert_array_equal(values, expected[channel][17:], err_msg=channel)
 
 
-FORMS = [(effect, form.name) for effect in sorted(EFFECTS) for form in EFFECTS[effect].forms[1:]]
+def equal(one: Mapping[str, np.ndarray], two: Mapping[str, np.ndarray]) -> None:
+    """Every channel to the last bit."""
+    for channel in one:
+        np.testing.assert_array_equal(one[channel], two[channel], err_msg=channel)
 
 
-@pytest.mark.parametrize(("effect", "form"), FORMS)
-def test_a_form_survives_its_file_and_off_it_changes_nothing(effect: str, form: str) -> None:
-    plain = rig_for(effect)
-    rig = plain.with_effect(effect, form=form)
+FORMS = [(effect, form) for effect in sorted(EFFECTS) for form in EFFECTS[effect].forms]
+
+
+@pytest.mark.parametrize(
+    ("effect", "form"), FORMS, ids=[f"{effect}-{form.name}" for effect, form in FORMS]
+)
+def test_a_form_survives_its_file_and_off_it_changes_nothing(effect: str, form: Form) -> None:
+    plain, first = rig_for(effect), form.parameters[0]
+    known = {first.name: 0.1 * first.upper}
+    rig = plain.with_effect(effect, std=known, form=form.name)
     again = parse_rig(rig.to_toml_text())
-    assert again.effects == rig.effects
-    one, two = run(rig), run(again)
-    for channel in one:
-        np.testing.assert_array_equal(one[channel], two[channel])
-    assert all(np.isfinite(one[channel]).all() for channel in one)
-    neutral = {
-        p.name: p.neutral for p in EFFECTS[effect].form(form).parameters if p.neutral is not None
-    }
-    one, two = by_blocks(plain), run(plain.with_effect(effect, neutral, form=form))
-    for channel in one:
-        np.testing.assert_array_equal(one[channel], two[channel])
+    assert (again.effects, again.effect_std) == (rig.effects, {effect: pytest.approx(known)})
+    assert json.loads(rig.to_json())["effects"] == [{**rig.effects[0], "at": ""}]
+    assert rig.without_effect(effect).effects == []
+    there = run(rig)
+    equal(there, run(again))
+    assert all(np.isfinite(there[channel]).all() for channel in there)
+    neutral = {p.name: p.neutral for p in form.parameters if p.neutral is not None}
+    assert bool(neutral) == (effect != "heat_transfer")  # the only one without
+    if neutral:
+        equal(by_blocks(plain), run(plain.with_effect(effect, neutral, form=form.name)))
 
 
-@pytest.mark.parametrize(("effect", "form"), FORMS)
-def test_parameters_of_one_name_are_the_same_in_every_form(effect: str, form: str) -> None:
-    info = EFFECTS[effect]
-    known = {p.name: p for other in info.forms for p in other.parameters}
-    chosen = info.form(form)
-    assert chosen.equation
-    for parameter in chosen.parameters:
+@pytest.mark.parametrize("info", EFFECTS.values(), ids=list(EFFECTS))
+def test_a_fit_can_read_the_table(info: EffectInfo) -> None:
+    names = {p.name.rstrip("_23") for p in info.parameters}
+    assert 1 <= len(names) <= (5 if info.catalogue else 24)
+    assert all((info.name, info.fingerprint, info.separates, info.reference))
+    known = {p.name: p for form in info.forms for p in form.parameters}
+    for form in info.forms:
+        assert form.equation
+        for p in form.parameters:
+            assert p.lower <= p.default <= p.upper
+            assert p.starts
+            assert [p.lower, *p.starts, p.upper] == sorted([p.lower, *p.starts, p.upper])
+            assert p.neutral is None or p.lower <= p.neutral <= p.upper
+            assert parse_unit(p.unit).scale == 1.0
+            assert p.meaning
+    for form in info.forms[1:]:
         # what is usual of it may be another: a push is harder than what pulls all the time
-        own, other = (replace(p, prior=None) for p in (parameter, known[parameter.name]))
-        assert own == other
-        assert parameter.starts
-        assert parameter.lower <= parameter.default <= parameter.upper
-        assert parse_unit(parameter.unit).scale == 1.0
-        assert parameter.meaning
-    sizes = {p.name for p in chosen.parameters if p.role_in(sealed=False) == "size"}
-    assert sizes & {p.name for p in info.parameters} or "share" in sizes
-
-
-def test_the_table_can_be_read_by_a_fit() -> None:
-    for effect in EFFECTS.values():
-        assert (
-            1
-            <= len({p.name.rstrip("_23") for p in effect.parameters})
-            <= (5 if effect.catalogue else 24)
-        )
-        assert all(
-            (effect.name, effect.equation, effect.fingerprint, effect.separates, effect.reference)
-        )
-        for parameter in effect.parameters:
-            assert parameter.lower <= parameter.default <= parameter.upper
-            assert parameter.starts
-            assert list(parameter.starts) == sorted(parameter.starts)
-            assert all(parameter.lower <= start <= parameter.upper for start in parameter.starts)
-            assert (
-                parameter.neutral is None or parameter.lower <= parameter.neutral <= parameter.upper
-            )
-            assert parse_unit(parameter.unit).scale == 1.0
-            assert parameter.meaning
+        for p in form.parameters:
+            assert replace(p, prior=None) == replace(known[p.name], prior=None)
+        sizes = {p.name for p in form.parameters if p.role_in(sealed=False) == "size"}
+        assert sizes & {p.name for p in info.parameters} or "share" in sizes
 
 
 @pytest.mark.parametrize("effect", sorted(EFFECTS))
@@ -210,6 +179,8 @@ def test_unknown_places_and_parameters_are_named() -> None:
         rig.with_effect("valve_dead_zone", at="left")
     with pytest.raises(ParameterError, match="whole rig"):
         rig.with_effect("base_flexibility", at="left")
+    with pytest.raises(ParameterError, match="valve"):
+        pamrs.rigs.sealed_chamber().with_effect("valve_dead_zone")
     entry = (
         '\n[[effects]]\nid = "muscle_creep"\n'
         'parameters = { stiffnes = { value = 1.0, unit = "N/m" } }\n'
@@ -219,18 +190,6 @@ def test_unknown_places_and_parameters_are_named() -> None:
     entry = '\n[[effects]]\nid = "clock_skew"\nat = "left"\n'
     with pytest.raises(RigError, match="whole rig"):
         parse_rig(rig.to_toml_text() + entry)
-
-
-def test_an_effect_on_what_is_not_there_is_refused() -> None:
-    sealed = pamrs.rigs.sealed_chamber()
-    for effect, word in (
-        ("valve_dead_zone", "valve"),
-        ("muscle_creep", "muscle"),
-        ("payload_swing", "joint"),
-        ("supply_leak", "supply"),
-    ):
-        with pytest.raises(ParameterError, match=word):
-            sealed.with_effect(effect)
 
 
 def test_a_lagging_sensor_is_inverted_where_it_drives() -> None:

@@ -22,15 +22,8 @@ SETTINGS = DiagnosisSettings()
 RANGES = {"supply_pressure": 16e5, "muscle_pressure": 16e5, "joint_angle": np.pi}
 
 ALTERED = (
-    "8 bit",
-    "10 bit",
-    "noise",
-    "three times its noise",
-    "mean of 41",
-    "clock",
-    "clock, resampled",
-    "clock, resampled the other way",
-    "reversed",
+    *("8 bit", "10 bit", "noise", "three times its noise", "mean of 41", "clock", "reversed"),
+    *("clock, resampled", "clock, resampled the other way"),
 )
 
 
@@ -129,14 +122,8 @@ def test_commands_in_many_sharp_steps_are_no_copies(seed: int) -> None:
     volts = np.repeat(5.0 + rng.uniform(-1.5, 1.5, 80), 50)
     made = pamrs.simulate(pamrs.rigs.shoulder(), volts, sample_time=0.005)
     for noise in (0.05, 1.0):
-        pair = [
-            of(
-                role,
-                role,
-                0.005,
-                {"valve_command": volts}
-                | {n: made[n] + noise * s * rng.standard_normal(4000) for n, s in SENSORS.items()},
-            )
-            for role in ("fit", "held_out")
-        ]
+        pair = []
+        for role in ("fit", "held_out"):
+            own = {n: made[n] + noise * s * rng.standard_normal(4000) for n, s in SENSORS.items()}
+            pair.append(of(role, role, 0.005, {"valve_command": volts} | own))
         assert len(without_copies(pair)[0]) == 2

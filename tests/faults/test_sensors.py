@@ -32,6 +32,7 @@ ROOT = Path(pamrs.__file__).parent / "rigs"
 def test_a_clipped_gauge_is_masked_in_all_recordings_and_said_first() -> None:
     """Each recording reaches 6 bar, where the gauge ends; in one of them it only touches that."""
     case = pamrs.load_case(HERE / "13_gauge_clipped")
+    assert not any(recording.logged for recording in case.recordings)  # on their own grid
     short = case.recordings[0]
     assert short.channels["muscle_pressure"][short.mask["muscle_pressure"]].max() == 6e5
 
@@ -105,7 +106,7 @@ def _says_nothing_else(found: pamrs.Diagnosis, claim: str) -> None:
     assert {block.verdict for block in found.blocks} == {"not_judged"}
 
 
-def _as(case: pamrs.recordings.Case, channels: dict[str, float]) -> pamrs.recordings.Case:
+def _as(case: Case, channels: dict[str, float]) -> Case:
     """A case whose values of some channels are in another unit than its log says."""
     turned = [
         replace(r, channels={n: v * channels.get(n, 1.0) for n, v in r.channels.items()})
@@ -192,19 +193,15 @@ def test_noise_does_not_follow_interpolation(tmp_path: Path, grid: float) -> Non
     assert recording.logged["muscle_pressure"][0] == pytest.approx(0.035, rel=1e-3)
 
 
-def test_noise_of_what_is_on_its_own_grid_is_as_it_was() -> None:
-    case = pamrs.load_case(HERE / "13_gauge_clipped")
-    assert not any(recording.logged for recording in case.recordings)
-
-
-def _healthy(change: Callable[[dict[str, np.ndarray]], None]) -> pamrs.recordings.Case:
-    """A sound rig at 100 Hz, of which a sensor or logger spoils something."""
+def _healthy(change: Callable[[dict[str, np.ndarray]], object], names: str = "abc") -> Case:
+    """A sound rig at 100 Hz, of which a sensor or logger spoils something in some recordings."""
     case = pamrs.load_case(HERE / "12_absolute_as_gauge")
     spoilt = []
     for recording in case.recordings:
         channels = {name: values.copy() for name, values in recording.channels.items()}
         channels["muscle_pressure"] -= 101325.0
-        change(channels)
+        if recording.name in names:
+            change(channels)
         mask = {name: np.isfinite(values) for name, values in channels.items()}
         spoilt.append(replace(recording, channels=channels, mask=mask))
     return replace(case, recordings=spoilt)
@@ -265,15 +262,7 @@ def test_blocks_without_a_value_are_no_physics() -> None:
 @pytest.mark.parametrize("which", ["abc", pytest.param("c", marks=pytest.mark.slow)])
 def test_a_command_that_was_not_logged_is_said_and_the_rest_is_judged(which: str) -> None:
     """In all recordings the valve and what it fills are not judged; one beside others goes."""
-    case = pamrs.load_case(HERE / "12_absolute_as_gauge")
-    spoilt = []
-    for recording in case.recordings:
-        channels = {name: values.copy() for name, values in recording.channels.items()}
-        channels["muscle_pressure"] -= 101325.0
-        if recording.name in which:
-            channels["valve_command"][:] = 5.0
-        spoilt.append(replace(recording, channels=channels))
-    found = pamrs.diagnose(replace(case, recordings=spoilt))
+    found = pamrs.diagnose(_healthy(lambda channels: channels["valve_command"].fill(5.0), which))
     (dead,) = found.faulty
     assert (dead.channel, dead.kind) == ("valve_command", "not_logged")
     claim = "valve_command has one value throughout (5 V) while muscle_pressure stands still"
@@ -286,15 +275,12 @@ def test_a_command_that_was_not_logged_is_said_and_the_rest_is_judged(which: str
 
 
 def test_a_command_that_was_not_logged_is_refused_where_nothing_else_can_be_judged() -> None:
-    case = pamrs.load_case(HERE / "12_absolute_as_gauge")
-    spoilt = []
-    for recording in case.recordings:
-        channels = dict(recording.channels) | {"valve_command": np.full(len(recording), 5.0)}
-        channels["muscle_pressure"] = channels["muscle_pressure"] - 101325.0
+    def without_angle(channels: dict[str, np.ndarray]) -> None:
+        channels["valve_command"][:] = 5.0
         del channels["joint_angle"]
-        spoilt.append(replace(recording, channels=channels))
+
     with pytest.raises(DiagnosisError, match="valve_command has one value throughout"):
-        pamrs.diagnose(replace(case, recordings=spoilt))
+        pamrs.diagnose(_healthy(without_angle))
 
 
 @pytest.mark.parametrize(("count", "apart"), [(16, 2.0), (37, 1.0)])
@@ -305,17 +291,9 @@ def test_few_samples_tell_a_leak(count: int, apart: float, leak: float) -> None:
     recordings = []
     for name in ("one", "two"):
         pressure = 4e5 * np.exp(-leak * time) + rng.normal(0.0, 300.0, count)
-        recordings.append(
-            Recording(
-                name,
-                "fit",
-                time,
-                apart,
-                {"muscle_pressure": pressure},
-                {"muscle_pressure": np.ones(count, dtype=bool)},
-                units={"muscle_pressure": "Pa"},
-            )
-        )
+        channels, used = {"muscle_pressure": pressure}, {"muscle_pressure": np.full(count, True)}
+        units = {"muscle_pressure": "Pa"}
+        recordings.append(Recording(name, "fit", time, apart, channels, used, units=units))
     rig = pamrs.load_rig(ROOT / "sealed_chamber.toml")
     found = pamrs.diagnose(Case("short", rig, recordings, HERE))
     assert [effect.id for effect in found.effects][:1] == (["leak_muscle"] if leak else [])

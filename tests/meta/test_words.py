@@ -127,11 +127,9 @@ def test_words_of_effects_are_not_private():
     def texts(entry):
         if isinstance(entry, dict):
             return [text for value in entry.values() for text in texts(value)]
-        return (
-            [text for value in entry for text in texts(value)]
-            if isinstance(entry, list)
-            else [str(entry)]
-        )
+        if isinstance(entry, list):
+            return [text for value in entry for text in texts(value)]
+        return [str(entry)]
 
     found = {
         path.name: words

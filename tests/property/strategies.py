@@ -14,14 +14,11 @@ from tests.reference import GeometryReference, MuscleReference
 from tests.tables import rows_of
 
 MODELS = (
-    "gaylord",
-    "chou_hannaford",
-    "mooney_rivlin",
-    "ferraresi",
-    "kothera",
-    "robinson",
+    *("gaylord", "chou_hannaford", "mooney_rivlin", "ferraresi", "kothera", "robinson"),
     "elbow_linear",
 )
+#: Models with a stress polynomial.
+POLYNOMIAL = ("ferraresi", "kothera", "robinson")
 GEOMETRIES = ("cylinder", "elliptic", "elliptic_published")
 
 
@@ -51,7 +48,7 @@ def model_arguments(draw: st.DrawFn, model: str, geometry: str | None = None) ->
     of another model.
     """
     arguments = draw(muscle_arguments(geometry or draw(st.sampled_from(GEOMETRIES))))
-    if model not in ("ferraresi", "kothera", "robinson"):
+    if model not in POLYNOMIAL:
         del arguments["modulus_slope"], arguments["modulus_offset"]
     if model == "mooney_rivlin":
         arguments |= {"c10": draw(st.floats(-1e5, 4e5)), "c01": draw(st.floats(-1e5, 4e5))}

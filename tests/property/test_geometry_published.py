@@ -218,8 +218,7 @@ def test_slender_muscle_is_a_cylinder(arguments: dict[str, Any], e: float) -> No
     np.testing.assert_allclose(gaps[1] / gaps[2], 4.0, rtol=0.1)
 
 
-# --- The reference against closed forms (pamrs plays no
-# part) ----------------------------------------------------
+# --- The reference against closed forms (pamrs plays no part)
 
 
 @MORE

@@ -17,11 +17,7 @@ from scipy.interpolate import CubicSpline
 
 import pamrs
 from pamrs.simulation import core_rig
-from tests.property.networks import (
-    Blocks,
-    networks,
-    rig_of,
-)
+from tests.property.networks import Blocks, networks, rig_of
 from tests.reference.planar import Link, PlanarArm
 from tests.runs import Run
 
@@ -56,14 +52,8 @@ def touches(run: pamrs.Simulation) -> bool:
 def test_mass_in_is_mass_stored_and_vented(drawn: tuple[Blocks, Run]) -> None:
     blocks, run = drawn
     got = run.core()
-    books, held = (
-        got.balance,
-        sum(
-            float(mass[0])
-            for word in ("air_mass", "line_mass")
-            for mass in got.under(word).values()
-        ),
-    )
+    books, words = got.balance, ("air_mass", "line_mass")
+    held = sum(float(mass[0]) for word in words for mass in got.under(word).values())
     assert abs(books.residual) <= 1e-9 * (abs(books.supplied) + abs(books.vented) + held)
     source = blocks["supply"]
     if source["kind"] == "tank":
@@ -76,11 +66,6 @@ def test_mass_in_is_mass_stored_and_vented(drawn: tuple[Blocks, Run]) -> None:
 
 
 # ------------------------------------------------------------------ power
-
-
-def joint_of(model: dict[str, Any]) -> pamrs.Joint:
-    """A transmission of a rig as a joint of its own."""
-    return pamrs.Joint.from_model(model)
 
 
 @SOME
@@ -102,7 +87,7 @@ def test_muscles_and_joints_have_the_same_power(drawn: tuple[Blocks, Run]) -> No
         angle, torque = got[f"joint_angle.{name}"], np.zeros(run.rows)
         for muscle, table in run.plant.ports("muscle").items():
             if table["joint"] == label:
-                joint = joint_of(run.plant.tables("transmission")[muscle])
+                joint = pamrs.Joint.from_model(run.plant.tables("transmission")[muscle])
                 torque += got[f"muscle_force.{muscle}"] * joint.moment_arm(angle)
         np.testing.assert_allclose(
             got[f"joint_torque.{name}"],
@@ -238,10 +223,8 @@ def test_the_order_of_the_blocks_in_the_file_is_of_no_account(
     blocks, run = drawn
     labels = list(blocks)
     random.shuffle(labels)
-    one, other = (
-        run.core(),
-        replace(run, rig=rig_of({label: blocks[label] for label in labels})).core(),
-    )
+    other = replace(run, rig=rig_of({label: blocks[label] for label in labels})).core()
+    one = run.core()
     assume(not touches(one))
     assert set(one) == set(other)
     for name in one:

@@ -354,21 +354,9 @@ def test_stops_hold_a_fallen_arm() -> None:
 
 
 def hanging(**changes: Any) -> dict[str, Any]:
-    load = {
-        "kind": "mass",
-        "min_length": 0.14,
-        "max_length": 0.202,
-        "mass": 20.0,
-        "viscous": 900.0,
-        "coulomb": 0.0,
-    }
-    load |= {
-        "coulomb_speed": 0.01,
-        "gravity": GRAVITY,
-        "stop_stiffness": 1e6,
-        "stop_damping": 1e3,
-        **changes,
-    }
+    load = {"kind": "mass", "min_length": 0.14, "max_length": 0.202, "mass": 20.0}
+    load |= {"viscous": 900.0, "coulomb": 0.0, "coulomb_speed": 0.01, "gravity": GRAVITY}
+    load |= {"stop_stiffness": 1e6, "stop_damping": 1e3, **changes}
     return rig(chambers=[chamber()], muscles=[muscle("", "load", None)], load=load)
 
 

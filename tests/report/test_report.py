@@ -215,11 +215,8 @@ def test_figure_is_a_png(make, tmp_path: Path) -> None:
 
 
 def test_figure_without_traces(tmp_path: Path) -> None:
-    assert (
-        synthetic.diagnosis(traces=[], probabilities={}, residuals={})
-        .figure(tmp_path / "f.png")
-        .exists()
-    )
+    bare = synthetic.diagnosis(traces=[], probabilities={}, residuals={})
+    assert bare.figure(tmp_path / "f.png").exists()
 
 
 def test_decimation_keeps_extremes_and_gaps() -> None:

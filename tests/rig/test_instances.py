@@ -7,10 +7,8 @@ import pytest
 
 import pamrs
 from pamrs.errors import ParameterError
-from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
 
-SIDES = ("flexor", "extensor")
 SHUT = {"flexor": 5.0, "extensor": 5.0}
 
 
@@ -44,26 +42,3 @@ def test_other_values_are_those_of_another_description() -> None:
     values[core.parameter_names.index("leak_muscle.flexor.conductance")] = -1.0
     with pytest.raises(ParameterError, match=r"leak_muscle\.flexor\.conductance"):
         core.with_values(values)
-
-
-def noted() -> pamrs.Rig:
-    """Two leaks, each with its own standard deviation."""
-    rig = pamrs.rigs.named("antagonistic_joint")
-    for side, size in (("flexor", 1e-10), ("extensor", 3e-11)):
-        rig = rig.with_effect(
-            "leak_muscle", {"conductance": size}, std={"conductance": 0.1 * size}, at=side
-        )
-    return rig
-
-
-def test_a_file_keeps_each_with_what_is_known_of_it() -> None:
-    rig = noted()
-    text = rig.to_toml_text()
-    again = parse_rig(text)
-    assert again.effects == rig.effects
-    assert [effect["at"] for effect in again.effects] == list(SIDES)
-    assert again.to_toml_text() == text
-    assert text.count("std = ") == 2
-    one, two = held(rig), held(again)
-    for channel in one:
-        np.testing.assert_array_equal(one[channel], two[channel])

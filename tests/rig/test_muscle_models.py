@@ -143,12 +143,6 @@ def test_braid_taut_only_in_extension() -> None:
     assert muscle.radius(-0.03) == pytest.approx(0.8 * 0.0127)
 
 
-@pytest.mark.parametrize("direction", [-1.5, 2.0, math.nan])
-def test_a_direction_beyond_the_branches_is_named(direction: float) -> None:
-    with pytest.raises(pamrs.ParameterError, match=r"muscle\.direction"):
-        shoulder_muscle().force(1e5, 0.1, direction=direction)
-
-
 def test_muscles_and_joints_can_be_pickled() -> None:
     muscle = shoulder_muscle().replace(friction_coefficient=0.1)
     again = pickle.loads(pickle.dumps(muscle))

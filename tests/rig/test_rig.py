@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -12,36 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pamrs
-from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, RigError
-from pamrs.rig import Rig, load_rig, parse_rig
+from pamrs.rig import load_rig, parse_rig
 from pamrs.rig.schema import BLOCKS
-from tests.effects.test_effects import rig_for
+from tests.rig.cases import refused, same
 from tests.tables import rows_of
 
 CONCEALED = Path(__file__).parents[2] / ".." / "shared" / "concealed"
 SHOULDER = (Path(pamrs.__file__).parent / "rigs" / "shoulder.toml").read_text(encoding="utf-8")
 
 
-def refused(text: str) -> str:
-    with pytest.raises(RigError) as caught:
-        parse_rig(text, source="stand.toml")
-    message = str(caught.value)
-    assert message.startswith("stand.toml")
-    return message
-
-
 def changed(old: str, new: str) -> str:
     assert SHOULDER.count(old) == 1, old
     return SHOULDER.replace(old, new)
-
-
-def same(one: Rig, other: Rig) -> bool:
-    return (
-        one.model == other.model
-        and one.parameters == other.parameters
-        and one.effect_std == other.effect_std
-    )
 
 
 # ------------------------------------------------------------------------ reading
@@ -66,16 +48,6 @@ def test_shoulder_in_si() -> None:
     assert rig.effects == []
 
 
-def test_sealed_chamber_has_no_more_than_a_chamber() -> None:
-    rig = pamrs.rigs.sealed_chamber()
-    assert rig.blocks == ("gas", "chamber", "sensors")
-    assert all(
-        rig.model[name] is None for name in ("supply", "valve", "muscle", "joint", "arm", "load")
-    )
-    assert rig.muscle is None
-    assert rig.parameters["chamber.dead_volume"].known
-
-
 def test_gas_and_chamber_are_enough() -> None:
     text = (
         'schema="pamrs.rig/1"\n[gas]\n[chamber]\ndead_volume={value=100,unit="cm3",unknown=true}\n'
@@ -84,6 +56,7 @@ def test_gas_and_chamber_are_enough() -> None:
     volume = rig.parameters["chamber.dead_volume"]
     assert volume.value == pytest.approx(1e-4)
     assert not volume.known
+    assert rig.muscle is None
     assert math.isinf(volume.tol)
     assert rig.model["sensors"] == {"pressure_zero": 0.0, "angle_zero": 0.0}
     assert same(rig, parse_rig(rig.to_toml_text()))
@@ -129,8 +102,7 @@ BAD = rows_of(__file__, "bad")
 @pytest.mark.parametrize(("old", "new", "wanted"), BAD)
 def test_mistakes_are_named(old: str, new: str, wanted: list[str]) -> None:
     message = refused(SHOULDER.replace(old, new, 1))
-    for words in wanted:
-        assert words in message, message
+    assert [words for words in wanted if words not in message] == [], message
 
 
 def test_all_problems_at_once() -> None:
@@ -167,6 +139,8 @@ def test_unreadable_files(tmp_path: Path) -> None:
     empty.write_text("")
     with pytest.raises(RigError, match=r"\[gas\] is missing"):
         load_rig(empty)
+    with pytest.raises(RigError, match="cannot be written"):
+        pamrs.rigs.shoulder().to_toml(tmp_path / "no" / "such" / "folder.toml")
 
 
 JSON_LIKE = st.recursive(
@@ -206,21 +180,8 @@ def test_with_parameters_leaves_the_old_rig_alone() -> None:
     assert isinstance(other.model["muscle"]["count"], int)
     assert rig.parameters["arm.payload"].value == 9.07
     rig.model["arm"]["payload"] = 0.0
+    rig.parameters.clear()
     assert rig.parameters["arm.payload"].value == 9.07
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("arm.payload", -1.0),
-        ("arm.payload", math.nan),
-        ("muscle.count", 2.5),
-        ("chamber.dead_volume", 0.0),
-    ],
-)
-def test_impossible_values_are_refused(name: str, value: float) -> None:
-    with pytest.raises(ParameterError, match=name):
-        pamrs.rigs.shoulder().with_parameters({name: value})
 
 
 @pytest.mark.parametrize(
@@ -233,83 +194,21 @@ def test_unknown_names_are_refused(name: str) -> None:
         pamrs.rigs.shoulder().parameter(name)
 
 
-def test_a_changed_table_of_parameters_leaves_the_rig_alone() -> None:
-    rig = pamrs.rigs.shoulder()
-    before = rig.parameters
-    taken = rig.parameters
-    taken.clear()
-    assert rig.parameters == before
-    other = rig.with_parameters({"arm.payload": 3.0})
-    assert other.parameters["arm.payload"].value == 3.0
-    assert rig.parameters["arm.payload"] == before["arm.payload"]
-
-
-def test_parameters_of_absent_blocks_are_not_there() -> None:
-    with pytest.raises(ParameterError, match=r"arm\.payload"):
-        pamrs.rigs.sealed_chamber().with_parameters({"arm.payload": 1.0})
-
-
-@pytest.mark.parametrize("effect", sorted(EFFECTS))
-def test_effects_round_trip(effect: str) -> None:
-    first = EFFECTS[effect].parameters[0]
-    rig = rig_for(effect).with_effect(
-        effect, {first.name: first.upper}, std={first.name: 0.1 * first.upper}
-    )
-    assert rig.effects[0]["id"] == effect
-    assert rig.effects[0]["parameters"][first.name] == first.upper
-    again = parse_rig(rig.to_toml_text())
-    assert same(rig, again)
-    assert again.effect_std[effect][first.name] == pytest.approx(0.1 * first.upper)
-    assert rig.without_effect(effect).effects == []
-    assert json.loads(rig.to_json())["effects"] == [{**rig.effects[0], "at": ""}]
-
-
-def test_an_effect_replaces_its_like() -> None:
-    rig = pamrs.rigs.shoulder().with_effect("leak_muscle", {"conductance": 1e-9})
-    rig = rig.with_effect("leak_muscle", {"conductance": 2e-9})
-    assert rig.effects == [
-        {"id": "leak_muscle", "parameters": {"conductance": 2e-9, "laminar_share": 0.0}}
-    ]
-    assert pamrs.rigs.shoulder().effects == []
-
-
-def test_effects_are_checked() -> None:
-    rig = pamrs.rigs.shoulder()
-    with pytest.raises(ParameterError, match="'gremlins'"):
-        rig.with_effect("gremlins")
-    with pytest.raises(ParameterError, match="'speed'"):
-        rig.with_effect("leak_muscle", {"speed": 1.0})
-    with pytest.raises(ParameterError, match="conductance = -1"):
-        rig.with_effect("leak_muscle", {"conductance": -1.0})
+def test_effects_of_a_file_are_checked() -> None:
     entry = '\n[[effects]]\nid = "leak_muscle"\nparameters = { conductance = %s }\n'
     assert "leak_muscle.conductance" in refused(SHOULDER + entry % '{ value = 1.0, unit = "bar" }')
     assert "no unit" in refused(SHOULDER + entry % "1e-9")
     assert "its standard deviation, std" in refused(
         SHOULDER + entry % '{ value = 1e-9, unit = "m3/(s Pa)", tol = 1e-10 }'
     )
-    assert "twice" in refused(SHOULDER + 2 * (entry % '{ value = 1e-9, unit = "m3/(s Pa)" }'))
     rig = parse_rig(SHOULDER + entry % '{ value = 0.1, unit = "l/(s bar)", std = 0.01 }')
     assert rig.effects[0]["parameters"]["conductance"] == pytest.approx(1e-9)
     assert rig.effect_std["leak_muscle"]["conductance"] == pytest.approx(1e-10)
 
 
-def test_toml_round_trip_through_a_file(tmp_path: Path) -> None:
-    rig = pamrs.rigs.shoulder().with_parameters({"arm.payload": 1 / 3, "sensors.angle_zero": -0.1})
-    assert same(rig, load_rig(rig.to_toml(tmp_path / "again.toml")))
-    with pytest.raises(RigError, match="cannot be written"):
-        rig.to_toml(tmp_path / "no" / "such" / "folder.toml")
-
-
 def test_names_with_quotes_survive() -> None:
     text = changed('name = "shoulder"', "name = '''a \"b\" \\ ü'''")
     assert parse_rig(parse_rig(text).to_toml_text()).name == 'a "b" \\ ü'
-
-
-def test_the_package_offers_what_it_says() -> None:
-    assert set(pamrs.__all__) <= set(dir(pamrs))
-    assert isinstance(pamrs.__version__, str)
-    with pytest.raises(AttributeError, match="nonsense"):
-        _ = pamrs.nonsense
 
 
 def test_equal_rigs_compare_equal_and_others_do_not() -> None:

@@ -14,37 +14,38 @@ from pamrs.library.evaluate import free_contraction
 TOLD = r"never exceeds 2 Pa \(gauge\): pascals are wanted, 1 bar is 1e5"
 
 
-def test_a_force_at_two_pascals_is_doubted() -> None:
-    muscle = pamrs.rigs.shoulder().muscle
-    with pytest.warns(UnitWarning, match=rf"^pressure {TOLD}") as caught:
-        force = muscle.force([0.0, 2.0], 0.05)
-    assert np.all(np.isfinite(force))
-    assert caught[0].filename == __file__
+SHOULDER = pamrs.rigs.shoulder()
+START = {"muscle_pressure": 2.0}
 
 
-def test_a_regulator_set_to_two_pascals_is_doubted() -> None:
-    rig = pamrs.rigs.regulated_joint()
-    with pytest.warns(UnitWarning, match=rf"^supply_command {TOLD}") as caught:
-        pamrs.simulate(rig, supply_command=np.full(20, 2.0), sample_time=0.01)
-    assert caught[0].filename == __file__
-
-
-def test_a_start_and_a_lift_at_two_pascals_are_doubted() -> None:
-    shoulder = pamrs.rigs.shoulder()
-    for begin in (
-        lambda: pamrs.simulate(
-            shoulder, 5.0, sample_time=0.01, duration=0.1, initial={"muscle_pressure": 2.0}
+@pytest.mark.parametrize(
+    ("call", "what"),
+    [
+        (lambda: SHOULDER.muscle.force([0.0, 2.0], 0.05), "pressure"),
+        (
+            lambda: pamrs.simulate(
+                pamrs.rigs.regulated_joint(), supply_command=np.full(20, 2.0), sample_time=0.01
+            ),
+            "supply_command",
         ),
-        lambda: pamrs.Simulator(shoulder, sample_time=0.01, initial={"muscle_pressure": 2.0}),
-    ):
-        with pytest.warns(UnitWarning, match=rf"^initial muscle_pressure {TOLD}") as caught:
-            begin()
-        assert caught[0].filename == __file__
-    with pytest.warns(UnitWarning, match=rf"^pressure {TOLD}") as caught:
-        pamrs.Joint(kind="pulley", radius=0.03).torque(shoulder.muscle, 2.0, 0.5)
-    assert [one.filename for one in caught] == [__file__]
-    with pytest.warns(UnitWarning, match=r"^pressure never exceeds 8\.3 Pa") as caught:
-        pamrs.lift(pamrs.rigs.named("elbow"), pressure=8.3)
+        (
+            lambda: pamrs.simulate(SHOULDER, 5.0, sample_time=0.01, duration=0.1, initial=START),
+            "initial muscle_pressure",
+        ),
+        (
+            lambda: pamrs.Simulator(SHOULDER, sample_time=0.01, initial=START),
+            "initial muscle_pressure",
+        ),
+        (
+            lambda: pamrs.Joint(kind="pulley", radius=0.03).torque(SHOULDER.muscle, 2.0, 0.5),
+            "pressure",
+        ),
+        (lambda: pamrs.lift(pamrs.rigs.named("elbow"), pressure=2.0), "pressure"),
+    ],
+)
+def test_two_pascals_are_doubted(call, what: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.warns(UnitWarning, match=rf"^{what} {TOLD}") as caught:
+        call()
     assert caught[0].filename == __file__
 
 
@@ -109,12 +110,6 @@ def test_what_a_sensor_reads_and_what_the_package_asks_is_not_doubted() -> None:
         start = {"muscle_pressure": 12.3456}
         pamrs.simulate(rig, 5.0, sample_time=0.01, duration=0.1, initial=start)
         free_contraction(rig.muscle, 4e5)
+        rig.muscle.force(0.0, 0.05)
+        rig.muscle.force([1.0, 2e5], 0.05)
         pamrs.Joint(kind="pulley", radius=0.03).torque(rig.muscle, [0.0, 2e5], 0.5)
-
-
-def test_no_pressure_and_usual_ones_are_not() -> None:
-    muscle = pamrs.rigs.shoulder().muscle
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        muscle.force(0.0, 0.05)
-        muscle.force([1.0, 2e5], 0.05)

@@ -4,26 +4,36 @@ from __future__ import annotations
 
 import difflib
 import random
+from dataclasses import replace
 from importlib import resources
+from pathlib import Path
 
 import pytest
 
 import pamrs
+from pamrs import library
 from pamrs.rig import load_rig, parse_rig
+from pamrs.rig.schema import keys_of
 from tests.rig.cases import same
 
-SHOULDER = resources.files("pamrs.rigs").joinpath("shoulder.toml").read_text(encoding="utf-8")
+
+def packaged(name: str) -> str:
+    """The text of a rig of the package."""
+    return resources.files("pamrs.rigs").joinpath(f"{name}.toml").read_text(encoding="utf-8")
+
+
+SHOULDER = packaged("shoulder")
 
 
 def differing(before: str, after: str) -> list[str]:
     """Lines of the second text that the first one does not have in their place."""
     lines = difflib.ndiff(before.splitlines(), after.splitlines())
-    return [line[2:] for line in lines if line[0] in "+-" and line.startswith("+ ")]
+    return [line[2:] for line in lines if line.startswith("+ ")]
 
 
 @pytest.mark.parametrize("name", pamrs.rigs.names())
 def test_an_unchanged_rig_is_its_file(name: str) -> None:
-    text = resources.files("pamrs.rigs").joinpath(f"{name}.toml").read_text(encoding="utf-8")
+    text = packaged(name)
     assert parse_rig(text).to_toml_text() == text
 
 
@@ -79,8 +89,6 @@ def test_a_note_of_the_case_and_texts_that_no_key_has() -> None:
 
 
 def test_unknown_becomes_known_and_back() -> None:
-    from dataclasses import replace
-
     text = SHOULDER.replace("tol = 0.18 }", "unknown = true }  # scale broken")
     rig = parse_rig(text)
     told = replace(rig, _tolerances={**rig._tolerances, "arm.payload": 0.25})
@@ -126,13 +134,8 @@ def test_any_numbers_come_back_to_the_last_bit(name: str) -> None:
     assert other.to_toml_text(comments=False) == again.to_toml_text(comments=False)
 
 
-def test_another_muscle_leaves_the_rest_of_the_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_another_muscle_leaves_the_rest_of_the_file(tmp_path: Path) -> None:
     """As ``pamrs fit muscle --out-rig`` writes it: keys of another model go and come."""
-    from dataclasses import replace
-
-    from pamrs import library
-    from pamrs.rig.schema import keys_of
-
     rig = parse_rig(SHOULDER)
     given = library.ch2_075in().parameters
     own = {key.name: given[key.name] for key in keys_of("muscle", given)}
@@ -145,18 +148,13 @@ def test_another_muscle_leaves_the_rest_of_the_file(tmp_path) -> None:  # type: 
 
 
 def test_a_text_that_says_something_else_is_not_followed() -> None:
-    from dataclasses import replace
-
     rig = replace(parse_rig(SHOULDER), _text="schema = 3\n")
     assert rig.to_toml_text() == rig.to_toml_text(comments=False)
     assert same(rig, parse_rig(rig.to_toml_text()))
 
 
 def test_blocks_with_names_come_and_go() -> None:
-    from dataclasses import replace
-
-    text = resources.files("pamrs.rigs").joinpath("antagonistic_joint.toml").read_text("utf-8")
-    rig = parse_rig(text)
+    rig = parse_rig(packaged("antagonistic_joint"))
     model = rig.model
     model["sensors"]["flexor"] = {"pressure_zero": 120.0}
     other = replace(rig, _model=model)

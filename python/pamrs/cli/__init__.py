@@ -18,7 +18,7 @@ from typing import Annotated, Final
 
 import typer
 
-from pamrs.cli._quiet import with_quiet
+from pamrs.cli._shared import with_quiet
 from pamrs.cli._streams import guarded
 from pamrs.cli.compare import compare_command
 from pamrs.cli.completion import VARIABLE, completion_command

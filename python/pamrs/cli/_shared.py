@@ -1,9 +1,12 @@
 """What the commands of ``pamrs`` share: numbers with units, muscles by name, files to write,
-progress, silence.
+progress, silence, arguments.
 """
 
 from __future__ import annotations
 
+import functools
+import inspect
+import json
 import os
 import re
 import sys
@@ -12,10 +15,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
+from pamrs._checks import refused
 from pamrs._files import shown
 from pamrs._writing import write_atomically
 from pamrs.cli._streams import terminal
@@ -48,6 +52,43 @@ QUIET: Final = ContextVar("QUIET", default=False)
 STDOUT: Final = Path("-")
 
 
+_QUIETLY = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="Only the result; of the rest, warnings and errors."),
+]
+#: Arguments that several commands take.
+RigName = Annotated[
+    Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")
+]
+AllowOutside = Annotated[
+    bool,
+    typer.Option(
+        "--allow-outside", help="Files may lie outside the folder of the case or description."
+    ),
+]
+
+
+def with_quiet(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command that also takes ``--quiet``, and then leaves out progress and notes."""
+
+    @functools.wraps(command)
+    def quietly(*args: Any, quiet: bool = False, **others: Any) -> Any:
+        before = QUIET.set(quiet)
+        try:
+            return command(*args, **others)
+        finally:
+            QUIET.reset(before)
+
+    signature = inspect.signature(command, eval_str=True)
+    option = inspect.Parameter(
+        "quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_QUIETLY
+    )
+    quietly.__annotations__ = {**command.__annotations__, "quiet": _QUIETLY}
+    changed: Any = quietly
+    changed.__signature__ = signature.replace(parameters=[*signature.parameters.values(), option])
+    return quietly
+
+
 def note(text: str) -> None:
     """Say something on standard error that is no warning, unless ``--quiet`` is given."""
     if not QUIET.get():
@@ -70,38 +111,39 @@ def check_new(path: Path) -> None:
         raise FileExistsError(f"{path}: is there already; it is not overwritten")
 
 
-def as_given(name: str, text: str) -> str:
-    """An option and what it was given, as messages name it."""
-    return f"--{name.replace('_', '-')} = {text.strip()!r}"
+def option(name: str) -> str:
+    """An option as it is typed."""
+    return f"--{name.replace('_', '-')}"
+
+
+@contextmanager
+def naming(name: str, text: str) -> Iterator[None]:
+    """Name an option and what it was given before the message of an error."""
+    try:
+        yield
+    except ParameterError as error:
+        raise ParameterError(f"{option(name)} = {text.strip()!r}: {error}") from None
 
 
 def quantity(name: str, text: str, dimension: str) -> tuple[float, float | None]:
     """Value and, after ``+-``, standard deviation of a number with a unit, in SI."""
     match = QUANTITY.match(text)
     if match is None or match["unit"] is None:
-        raise ParameterError(
-            f"{as_given(name, text)} is not allowed: a number with a unit like "
-            f"{_USUAL.get(dimension, DIMENSIONS[dimension])!r} is needed"
-        )
-    try:
+        usual = _USUAL.get(dimension, DIMENSIONS[dimension])
+        needed = f"a number with a unit like {usual!r} is needed"
+        raise refused(option(name), text.strip(), needed)
+    with naming(name, text):
         value = to_si(float(match["value"]), match["unit"], dimension)
-        spread = (
-            None
-            if match["tol"] is None
-            else to_si(float(match["tol"]), match["unit"], dimension, difference=True)
-        )
-    except ParameterError as error:
-        raise ParameterError(f"{as_given(name, text)}: {error}") from None
-    return value, spread
+        if match["tol"] is None:
+            return value, None
+        return value, to_si(float(match["tol"]), match["unit"], dimension, difference=True)
 
 
 def exact(name: str, text: str, dimension: str) -> float:
     """A number with a unit in SI, without a standard deviation."""
     value, spread = quantity(name, text, dimension)
     if spread is not None:
-        raise ParameterError(
-            f"{as_given(name, text)} is not allowed: a standard deviation has no use here"
-        )
+        raise refused(option(name), text.strip(), "a standard deviation has no use here")
     return value
 
 
@@ -169,10 +211,13 @@ Contents: TypeAlias = dict[Path | None, "str | bytes | Callable[[Path], object]"
 
 
 def document(schema: str, **content: Any) -> str:
-    """A result as JSON, its schema first."""
-    import json
+    """A result as JSON, its schema first; what has ``to_dict`` is written as that says."""
 
-    return json.dumps({"schema": schema, **content}, indent=1, allow_nan=False) + "\n"
+    def plain(part: Any) -> Any:
+        return part.to_dict()
+
+    told = {"schema": schema, **content}
+    return json.dumps(told, indent=1, allow_nan=False, default=plain) + "\n"
 
 
 def write(contents: Contents, told: str = "") -> None:

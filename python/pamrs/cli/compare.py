@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -24,18 +24,14 @@ def compare_command(
     parameters, what the models miss, and what changed.
     """
     check_writable(file_of(json), out)
+    from pamrs.diagnosis.result import load_result
     from pamrs.findings import compare_results
     from pamrs.report.compare import comparison_html, comparison_text
 
-    results = _read(first), _read(second)
-    found = compare_results(_names(first, second), *results)
-    write(
-        {
-            json: document("pamrs.comparison/1", **found.to_dict()),
-            out: comparison_html(found),
-        },
-        comparison_text(found),
-    )
+    one, other = (load_result(path).to_dict() for path in (first, second))
+    found = compare_results(_names(first, second), one, other)
+    result = document("pamrs.comparison/1", **found.to_dict())
+    write({json: result, out: comparison_html(found)}, comparison_text(found))
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
@@ -50,10 +46,3 @@ def _short(path: Path) -> str:
     if whole.is_dir():
         return whole.name
     return whole.parent.name if whole.name == "result.json" else whole.stem
-
-
-def _read(path: Path) -> dict[str, Any]:
-    """A result as a table, by its file or the folder with ``result.json``."""
-    from pamrs.diagnosis.result import load_result
-
-    return load_result(path).to_dict()

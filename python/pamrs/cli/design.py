@@ -13,15 +13,7 @@ import typer
 
 from pamrs._checks import refused
 from pamrs._writing import check_writable, write_atomically
-from pamrs.cli._shared import (
-    Contents,
-    document,
-    exact,
-    file_of,
-    json_help,
-    named_muscle,
-    write,
-)
+from pamrs.cli._shared import Contents, document, exact, file_of, json_help, named_muscle, write
 from pamrs.cli._streams import terminal
 from pamrs.units import bar_and_psi
 
@@ -311,9 +303,9 @@ def _document(title: str, found: _Found) -> str:
             "bounds": {name: list(pair) for name, pair in problem.bounds.items()},
             "max_contraction": problem.max_contraction,
         },
-        design=found.design.to_dict(),
-        minimum_pressure=None if found.lowest is None else found.lowest.to_dict(),
-        least_pressure=None if found.strict is None else found.strict.to_dict(),
+        design=found.design,
+        minimum_pressure=found.lowest,
+        least_pressure=found.strict,
         comparison=None if found.comparison is None else found.comparison.rows(),
-        front=None if found.front is None else found.front.to_dict(),
+        front=found.front,
     )

@@ -12,6 +12,7 @@ from pamrs._writing import check_writable, write_atomically
 from pamrs.channels import channel_of, with_trait
 from pamrs.cli._shared import (
     STDOUT,
+    AllowOutside,
     Contents,
     exact,
     file_of,
@@ -82,12 +83,7 @@ def diagnose_command(
             ),
         ),
     ] = False,
-    allow_outside: Annotated[
-        bool,
-        typer.Option(
-            "--allow-outside", help="Rig file and recordings may lie outside the case folder."
-        ),
-    ] = False,
+    allow_outside: AllowOutside = False,
     plan: Annotated[
         Path | None,
         typer.Option(
@@ -129,7 +125,8 @@ def diagnose_command(
             )
         if any(path is not None for path in (report, pdf, png, model, experiment)):
             raise typer.BadParameter("--plan writes text and --json only")
-        _plan(plan, channels, pressure_noise, angle_noise, force_noise, json)
+        noise = {"pressure": pressure_noise, "angle": angle_noise, "force": force_noise}
+        _plan(plan, channels, noise, json)
         return
     if case is None:
         raise typer.BadParameter(
@@ -212,29 +209,20 @@ def _model_text(result: Diagnosis, case: Case, file: Path) -> str:
 
 
 def _plan(
-    rig: Path,
-    channels: str | None,
-    pressure_noise: str | None,
-    angle_noise: str | None,
-    force_noise: str | None,
-    json: Path | None,
+    rig: Path, channels: str | None, noises: dict[str, str | None], json: Path | None
 ) -> None:
-    """What a diagnosis could tell, to standard output and a file."""
+    """What a diagnosis could tell, to standard output and a file; noise by its dimension."""
     from json import dumps
 
     from pamrs.diagnosis.next_experiment import measurable, plan_diagnosis
 
     loaded = rig_named(rig)
     noise: dict[str, float] = {}
-    if pressure_noise is not None:
-        noise |= dict.fromkeys(
-            with_trait("pressure"),
-            exact("pressure_noise", pressure_noise, "pressure"),
-        )
-    if angle_noise is not None:
-        noise["joint_angle"] = exact("angle_noise", angle_noise, "angle")
-    if force_noise is not None:
-        noise["force"] = exact("force_noise", force_noise, "force")
+    of = {"pressure": with_trait("pressure"), "angle": ("joint_angle",), "force": ("force",)}
+    for dimension, text in noises.items():
+        if text is not None:
+            size = exact(f"{dimension}_noise", text, dimension)
+            noise |= dict.fromkeys(of[dimension], size)
     given = (
         [name for name in measurable(loaded) if channel_of(name) != "temperature"]
         if channels is None

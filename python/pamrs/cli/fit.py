@@ -16,11 +16,13 @@ from pamrs._checks import refused
 from pamrs._writing import check_writable, write_atomically
 from pamrs.cli._shared import (
     GEOMETRY,
+    AllowOutside,
     Contents,
     document,
     file_of,
     json_help,
     named_muscle,
+    option,
     progress,
     quantity,
     write,
@@ -62,10 +64,6 @@ _Where = Annotated[
 ]
 _Clipped = Annotated[str | None, typer.Option(help='A force that means off the scale, like "0 N".')]
 _Picture = Annotated[Path | None, typer.Option("--png", help="Write the summary picture.")]
-_Outside = Annotated[
-    bool,
-    typer.Option("--allow-outside", help="A description's table may lie outside its folder."),
-]
 
 # of ``pamrs fit muscle`` alone
 _Data = Annotated[
@@ -153,7 +151,7 @@ def _muscle(
     rig: _FittedRig = None,
     json: _Result = None,
     png: _Picture = None,
-    allow_outside: _Outside = False,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
     check_writable(report, rig, file_of(json), png)
@@ -210,7 +208,7 @@ def _map(
         typer.Option(help="Write the rig with this table as its muscle, and the table's error."),
     ] = None,
     json: Annotated[Path | None, typer.Option(help=json_help(MAP_SCHEMA))] = (None),
-    allow_outside: _Outside = False,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Make a table of forces of measurements alone, monotone in pressure and contraction: a muscle
     that no force model has to fit. Its geometry gives the volume only.
@@ -222,7 +220,7 @@ def _map(
     with progress(f"fitting {inputs.data.label}"):
         fit = fit_map(inputs.data, nodes=nodes)
     contents: Contents = {
-        json: _document(MAP_SCHEMA, inputs.data, context, fit=fit.to_dict()) if json else "",
+        json: _document(MAP_SCHEMA, inputs.data, context, fit=fit) if json else "",
         rig: fit.to_rig(inputs.muscle, inputs.rig).to_toml_text() if rig else "",
     }
     write(contents, f"{inputs.data.label}: {fit.fit_report()}")
@@ -247,7 +245,7 @@ def _friction(
     floor: Annotated[float, typer.Option(help="The least that c_F becomes.")] = 0.01,
     json: Annotated[Path | None, typer.Option(help=json_help(FRICTION_SCHEMA))] = None,
     png: _Picture = None,
-    allow_outside: _Outside = False,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Fit the friction c_F = max(c0 + c1 P, floor) of a muscle to its hysteresis loops; of its
     geometry, the rest length is enough.
@@ -261,9 +259,7 @@ def _friction(
         fit = fit_friction(map_, floor=floor)
     rows = len(map_)
     contents: Contents = {
-        json: _document(FRICTION_SCHEMA, map_, context, rows=rows, fit=fit.to_dict())
-        if json
-        else "",
+        json: _document(FRICTION_SCHEMA, map_, context, rows=rows, fit=fit) if json else "",
         png: lambda path: write_atomically(path, render_friction_png(fit, map_)),
     }
     write(contents, f"{map_.label}: {fit.fit_report()}")
@@ -377,14 +373,11 @@ def _inputs(context: typer.Context) -> _Inputs:
     """From a description, or from a table and the options."""
     given, data = context.params, context.params["data"]
     if data.suffix.lower() == ".toml":
-        beside = [
-            key
-            for key in ("muscle", *GEOMETRY, "where", "clipped")
-            if given[key] or given[key] == ""
-        ]
+        others = ("muscle", *GEOMETRY, "where", "clipped")
+        beside = [key for key in others if given[key] or given[key] == ""]
         if beside:
             raise ParameterError(
-                f"{', '.join(map(_option, beside))} cannot be given: {data} describes its table "
+                f"{', '.join(map(option, beside))} cannot be given: {data} describes its table "
                 "and its muscle itself"
             )
         from pamrs.fit import load_measured_muscle
@@ -394,10 +387,6 @@ def _inputs(context: typer.Context) -> _Inputs:
     start, tolerance, base = _start(given)
     map_ = _table(given, float(start.parameters["rest_length"]))
     return _Inputs(map_.checked_against(start), start, tolerance, rig=base)
-
-
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
 
 
 def _table(given: Mapping[str, Any], rest_length: float) -> ForceMap:
@@ -476,7 +465,7 @@ def _start(given: Mapping[str, Any]) -> tuple[Muscle, dict[str, float], Rig | No
     if given["muscle"] is not None:
         base, known, rig = named_muscle(given["muscle"])
         return base.replace(**values), {**known, **tolerance}, rig
-    lacking = [_option(name) for name in GEOMETRY if name not in values]
+    lacking = [option(name) for name in GEOMETRY if name not in values]
     if lacking:
         raise ParameterError(
             f"the geometry of the muscle is missing: give {', '.join(lacking)} (like --rest-length "
@@ -513,13 +502,12 @@ def _command(context: typer.Context) -> str:
     """The command line that gives this result again."""
     words = ["pamrs", "fit", str(context.info_name), str(context.params["data"])]
     for name, value in context.params.items():
-        option = _option(name)
         if value is True:
-            words.append(option)
+            words.append(option(name))
         elif isinstance(value, (list, tuple)):
-            words += [word for item in value for word in (option, str(item))]
+            words += [word for item in value for word in (option(name), str(item))]
         elif value is not None and value is not False and name != "data":
-            words += [option, str(value)]
+            words += [option(name), str(value)]
     return shlex.join(words)
 
 
@@ -544,8 +532,8 @@ def _muscle_document(
         context,
         issues=fit.data.issues,
         rows=len(fit.data),
-        friction=None if friction is None else friction.to_dict(),
-        fit=fit.to_dict(),
-        leave_one_pressure_out=None if cross is None else cross.to_dict(),
+        friction=friction,
+        fit=fit,
+        leave_one_pressure_out=cross,
         comparison=None if comparison is None else comparison.to_dicts(),
     )

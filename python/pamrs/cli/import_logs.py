@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from pamrs._checks import refused
 from pamrs._files import is_inside, resolved
-from pamrs.cli._shared import Contents, as_given, check_new, exact, progress, rig_named, write
+from pamrs.cli._shared import Contents, check_new, exact, option, progress, rig_named, write
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -106,11 +107,7 @@ def _spacing(text: str) -> float:
     """The spacing of samples [s]."""
     step = exact("sample_time", text, "time")
     if not 0.0 < step <= _MOST_STEP:
-        from pamrs.errors import ParameterError
-
-        raise ParameterError(
-            f"{as_given('sample_time', text)} is not allowed: above zero, a day at most"
-        )
+        raise refused(option("sample_time"), text.strip(), "above zero, a day at most")
     return step
 
 

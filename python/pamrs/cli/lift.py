@@ -8,24 +8,13 @@ from typing import Annotated, Final
 import typer
 
 from pamrs._writing import check_writable
-from pamrs.cli._shared import (
-    as_given,
-    document,
-    exact,
-    file_of,
-    json_help,
-    rig_named,
-    write,
-)
-from pamrs.errors import ParameterError
+from pamrs.cli._shared import RigName, document, exact, file_of, json_help, naming, rig_named, write
 
 SCHEMA: Final = "pamrs.lift/1"
 
 
 def lift_command(
-    rig: Annotated[
-        Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")
-    ],
+    rig: RigName,
     pressure: Annotated[
         str | None,
         typer.Option(help='Gauge pressure, like "8 bar"; that of the supply by default.'),
@@ -52,10 +41,8 @@ def lift_command(
     if payload is not None:
         mass = exact("payload", payload, "mass")
         if "arm.payload" in loaded.parameters:
-            try:
+            with naming("payload", payload):
                 loaded = loaded.with_parameters({"arm.payload": mass})
-            except ParameterError as error:
-                raise ParameterError(f"{as_given('payload', payload)}: {error}") from None
     result = lift(
         loaded,
         pressure=None if pressure is None else exact("pressure", pressure, "pressure"),

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from pamrs.cli._shared import note
+from pamrs.cli._shared import AllowOutside, note
 
 INCOMPLETE: Final = 3
 """Exit code when a case could not be diagnosed."""
@@ -29,12 +29,7 @@ def prove_command(
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Diagnose again what has a result.")
     ] = False,
-    allow_outside: Annotated[
-        bool,
-        typer.Option(
-            "--allow-outside", help="Rig files and recordings may lie outside the case folders."
-        ),
-    ] = False,
+    allow_outside: AllowOutside = False,
     timeout: Annotated[
         float, typer.Option(help="Seconds after which a case is given up.")
     ] = 1800.0,

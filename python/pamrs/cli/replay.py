@@ -10,12 +10,7 @@ import typer
 from pamrs._checks import one_of
 from pamrs._writing import check_writable
 from pamrs.channels import channel_of, laboratory_unit
-from pamrs.cli._shared import (
-    progress,
-    rig_named,
-    usable_samples,
-    write,
-)
+from pamrs.cli._shared import AllowOutside, progress, rig_named, usable_samples, write
 from pamrs.errors import CaseError, RecordingError, SimulationError
 from pamrs.units import with_unit
 
@@ -44,10 +39,7 @@ def replay_command(
             "--recording the first held-out one."
         ),
     ] = None,
-    allow_outside: Annotated[
-        bool,
-        typer.Option("--allow-outside", help="Read files that lie outside the case folder."),
-    ] = False,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Simulate the whole rig from what went into it in each recording of a case (commands, and
     pressures or lengths where nothing drives them), and compare: free-running, from the first

@@ -10,7 +10,7 @@ import typer
 from pamrs import rigs
 from pamrs._files import resolved
 from pamrs._writing import write_atomically
-from pamrs.cli._shared import check_new, rig_named
+from pamrs.cli._shared import RigName, check_new, rig_named
 from pamrs.cli.completion import rig_names
 from pamrs.units import with_unit
 
@@ -21,11 +21,7 @@ rig_app = typer.Typer(help="Work with rig files.")
 
 
 @rig_app.command("check")
-def _rig_check(
-    file: Annotated[
-        Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")
-    ],
-) -> None:
+def _rig_check(file: RigName) -> None:
     """Check a rig file, say what is connected to what, and list its parameters, and those of its
     effects with their bounds, in SI units; what is possible and hardly meant is a warning.
     """

@@ -12,14 +12,7 @@ import typer
 from pamrs._checks import refused
 from pamrs._writing import check_writable, write_atomically
 from pamrs.channels import channel_of, dotted, laboratory_unit, unit_of
-from pamrs.cli._shared import (
-    Contents,
-    exact,
-    progress,
-    rig_named,
-    usable_samples,
-    write,
-)
+from pamrs.cli._shared import Contents, RigName, exact, progress, rig_named, usable_samples, write
 from pamrs.errors import ParameterError, RecordingError, meant
 from pamrs.units import with_unit
 
@@ -50,9 +43,7 @@ _INITIAL = {
 
 
 def simulate_command(
-    rig: Annotated[
-        Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")
-    ],
+    rig: RigName,
     input: Annotated[
         Path | None, typer.Option("--input", help="Recording whose inputs drive the rig (CSV).")
     ] = None,

@@ -13,12 +13,12 @@ from pamrs._checks import positive, refused
 from pamrs._writing import check_writable
 from pamrs.cli._shared import (
     QUANTITY,
-    as_given,
     document,
     exact,
     file_of,
     json_help,
     named_muscle,
+    naming,
     write,
 )
 from pamrs.errors import ParameterError
@@ -110,10 +110,8 @@ def size_command(
 def _size(name: str, text: str, dimension: str, *, zero: bool = False) -> float:
     """The same, finite and above zero, or zero where that is allowed."""
     value = exact(name, text, dimension)
-    try:
+    with naming(name, text):
         return positive(dimension, value, zero=zero)
-    except ParameterError as error:
-        raise ParameterError(f"{as_given(name, text)}: {error}") from None
 
 
 def _measures(text: str, unit: str) -> bool:

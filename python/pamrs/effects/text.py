@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import difflib
 import textwrap
-from collections.abc import Mapping
 from typing import Final
 
 from pamrs._checks import refused
@@ -89,23 +88,18 @@ def where(info: EffectInfo) -> str:
 def range_of(parameter: EffectParameter) -> str:
     """Bounds of a parameter, where it is expected, and the value at which it does nothing."""
     text = f"{parameter.lower:g} to {parameter.upper:g}"
-    text += (
-        "" if parameter.expected is None else ", expected {:g} to {:g}".format(*parameter.expected)
-    )
+    if parameter.expected is not None:
+        text += ", expected {:g} to {:g}".format(*parameter.expected)
     return text if parameter.neutral is None else f"{text}, off at {parameter.neutral:g}"
 
 
-def snippet(
-    effect: str, values: Mapping[str, float] | None = None, *, form: str = "", at: str = ""
-) -> str:
-    """The lines of a rig file that switch an effect on.
+def snippet(effect: str, *, form: str = "", at: str = "") -> str:
+    """The lines of a rig file that switch an effect on, with its usual values.
 
     Parameters
     ----------
     effect : str
         Its id.
-    values : mapping of str to float, optional
-        SI values; what is left out has the catalogue's default.
     form : str, optional
         Name of one of its forms; by default the first.
     at : str, optional
@@ -119,24 +113,21 @@ def snippet(
     Raises
     ------
     ParameterError
-        If there is no such effect, or it has no such form or parameter, or acts at no block.
+        If there is no such effect, or it has no such form, or acts at no block.
     """
-    info, given = entry(effect), values or {}
+    info = entry(effect)
     chosen = _form(info, form)
     if at and not info.at:
         raise refused("at", at, f"{effect} acts on the whole rig")
-    names = [parameter.name for parameter in chosen.parameters]
-    if unknown := [name for name in given if name not in names]:
-        raise ParameterError(f"{effect} has no parameter {unknown[0]!r}; it has {', '.join(names)}")
-    width = max(map(len, names))
+    width = max(len(p.name) for p in chosen.parameters)
     lines = ["[[effects]]", f'id = "{info.id}"']
     lines += [f'at = "{at}"'] if at else []
     lines += [f'form = "{chosen.name}"'] if chosen is not info.forms[0] else []
     lines.append("[effects.parameters]")
-    for p in chosen.parameters:
-        lines.append(
-            f'{p.name:<{width}} = {{ value = {given.get(p.name, p.default):g}, unit = "{p.unit}" }}'
-        )
+    lines += [
+        f'{p.name:<{width}} = {{ value = {p.default:g}, unit = "{p.unit}" }}'
+        for p in chosen.parameters
+    ]
     return "\n".join(lines)
 
 
@@ -202,12 +193,7 @@ def description(effect: str) -> str:
 def _parameters(info: EffectInfo, form: Form) -> list[str]:
     """A table of the parameters of a form."""
     rows = [
-        (
-            p.name,
-            with_unit(f"{p.default:g}", p.unit),
-            range_of(p),
-            p.meaning,
-        )
+        (p.name, with_unit(f"{p.default:g}", p.unit), range_of(p), p.meaning)
         for p in form.parameters
     ]
     widths = [max(len(row[column]) for row in rows) for column in range(3)]

@@ -445,11 +445,7 @@ def top_of(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) 
     return min(*said, 0.8 * inlet)  # a tank falls while it is drawn from
 
 
-def pressure_range(
-    rig: Rig,
-    *,
-    highest: float | Mapping[str, float] | None = None,
-) -> Range:
+def pressure_range(rig: Rig, *, highest: float | Mapping[str, float] | None = None) -> Range:
     """Pressures between which a rig of one chain is worth exciting.
 
     Parameters
@@ -541,11 +537,7 @@ class Spans:
     alone: dict[str, Range]
 
 
-def spans_of(
-    rig: Rig,
-    *,
-    highest: float | Mapping[str, float] | None = None,
-) -> Spans:
+def spans_of(rig: Rig, *, highest: float | Mapping[str, float] | None = None) -> Spans:
     """Pressures of a rig of several chains: all rise together, which says at which each is held;
     then each rises alone.
 
@@ -587,12 +579,7 @@ def spans_of(
 
 
 def _free(
-    rig: Rig,
-    chain: Chain,
-    chains: Sequence[Chain],
-    found: Simulation,
-    top: float,
-    first: int = 0,
+    rig: Rig, chain: Chain, chains: Sequence[Chain], found: Simulation, top: float, first: int = 0
 ) -> Range:
     """The pressures of a chain, as it rises, at which nothing that some chains move is at a stop;
     all of them where something always is.

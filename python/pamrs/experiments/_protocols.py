@@ -15,17 +15,8 @@ from numpy.typing import NDArray
 
 from pamrs.channels import dotted
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
-from pamrs.experiments._chains import (
-    Range,
-    chains_of,
-    is_sealed,
-    joined,
-    pressure_range,
-)
-from pamrs.experiments._experiment import (
-    Experiment,
-    in_bar,
-)
+from pamrs.experiments._chains import Range, chains_of, is_sealed, joined, pressure_range
+from pamrs.experiments._experiment import Experiment, in_bar
 from pamrs.experiments._frame import Rates, Seen, frame_of, seen_in
 from pamrs.experiments._maker import Maker, rows
 from pamrs.recordings import Recording
@@ -194,10 +185,7 @@ def library(
 
 
 def experiments_of(
-    rig: Rig,
-    records: Sequence[Recording],
-    rates: Rates,
-    only: Collection[str] | None = None,
+    rig: Rig, records: Sequence[Recording], rates: Rates, only: Collection[str] | None = None
 ) -> list[Experiment]:
     """The experiments of the rig (those of some kinds, if they are given), at the sample time and
     up to the pressures of what was recorded.

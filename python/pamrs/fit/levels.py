@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._normal import solve_normal
+from pamrs._arrays import solve_normal
 
 __all__ = ["LawParameter", "LevelLine", "fit_levels"]
 

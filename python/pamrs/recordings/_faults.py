@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._stretches import stretches
+from pamrs._arrays import stretches
 from pamrs.channels import CHANNELS
 
 Array = NDArray[np.float64]

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._arrays import stretches
 from pamrs._checks import quantities
 from pamrs._files import MOST_NAME, shown
-from pamrs._stretches import stretches
 from pamrs._tables import Columns, Tabular
 from pamrs._tables import over_time as columns_over_time
 from pamrs._views import Panels, View, in_laboratory_units, over_time

@@ -37,6 +37,7 @@ __all__ = [
     "Panel",
     "curves",
     "draw_panel",
+    "draw_panels",
     "free_head",
     "free_panels",
     "legend_below",
@@ -186,6 +187,12 @@ def _line(name: str, stage: str, time: FloatArray, values: FloatArray, **how: An
     return Line(name, COLOURS[stage], *decimate(time, values), **how)
 
 
+def _compared(trace: Trace, factor: float) -> list[Line]:
+    """What was measured, and what the model of the rig file gives."""
+    measured = _line("measured", "measured", trace.time, trace.measured * factor, width=2.6)
+    return [measured, _line("your model", "before", trace.time, trace.before * factor)]
+
+
 def free_panels(diagnosis: Findings) -> list[Panel]:
     """The worst recording from its commands alone: measured, your model and the final one, the
     channels first that your model misses most; the telling trace where there is no free run.
@@ -211,8 +218,7 @@ def free_panels(diagnosis: Findings) -> list[Panel]:
     panels = []
     for trace in traces[:MOST_FREE]:
         unit, factor = display_unit(trace.unit, _largest(trace.measured))
-        lines = [_line("measured", "measured", trace.time, trace.measured * factor, width=2.6)]
-        lines.append(_line("your model", "before", trace.time, trace.before * factor))
+        lines = _compared(trace, factor)
         if trace.after is not None and final != YOURS and _has(trace.after, trace.before):
             lines.append(_line(final, "after", trace.time, trace.after * factor))
         title = _quantity(spoken_name(trace.channel), unit) + missed_by(trace, factor)
@@ -236,8 +242,7 @@ def trace_panels(diagnosis: Findings, traces: Sequence[Trace]) -> list[Panel]:
         marked = diagnosis.where.recording == trace.recording
         spans = diagnosis.where.intervals if marked else []
         unit, factor = display_unit(trace.unit, _largest(trace.measured))
-        lines = [_line("measured", "measured", trace.time, trace.measured * factor, width=2.6)]
-        lines.append(_line("your model", "before", trace.time, trace.before * factor))
+        lines = _compared(trace, factor)
         refitted = trace.refit is not None and _has(trace.refit, trace.before)
         if trace.refit is not None and refitted:
             curve = trace.refit * factor
@@ -275,6 +280,15 @@ def draw_panel(axes: Axes, panel: Panel, scale: float = 1.0) -> None:
     axes.margins(x=0.005)
 
 
+def draw_panels(part: Any, panels: Sequence[Panel], scale: float = 1.0) -> None:
+    """Panels below each other in a figure or a part of one, with one legend."""
+    every = part.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, panel in zip(every, panels, strict=True):
+        draw_panel(axes, panel, scale)
+    legend_below(part, every)
+    every[-1].set_xlabel("time [s]")
+
+
 def curves(panels: Sequence[Panel], prefix: str) -> str:
     """Panels as a drawing that stands by itself, and the same as data that a script redraws.
 
@@ -292,11 +306,7 @@ def curves(panels: Sequence[Panel], prefix: str) -> str:
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.6, 1.85 * len(panels) + 0.35), layout="constrained")
-        every = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        for axes, panel in zip(every, panels, strict=True):
-            draw_panel(axes, panel)
-        legend_below(figure, every)
-        every[-1].set_xlabel("time [s]")
+        draw_panels(figure, panels)
         drawn = svg_text(figure, prefix)
     told = [
         {

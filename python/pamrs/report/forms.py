@@ -4,10 +4,11 @@ odd, with which memory, and the form with its numbers.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from pamrs.effects import CLOSURE_TERMS, EFFECTS, WORDS, ClosureTerm
 from pamrs.findings import Form
+from pamrs.report.text import listed
 
 _SPOKEN_SHARE = 0.05  # share of the form from which a kind of dependence is put into words
 _UNITS = {  # factors and units in which sizes are told
@@ -46,8 +47,9 @@ def form_sentence(form: Form) -> str:
         f"In the block {form.block} ({form.covers}) a {told.what} is missing, "
         f"{form.effective / size:.3g} {unit} effective (99 % below {form.largest / size:.3g} "
         f"{unit}); it takes {_percent(form.taken)} of the mismatch there. It is a function of "
-        f"{_listed(variables or ['nothing: it is constant'])}: {_listed(words)}. {told.letter} = "
-        f"{_formula(form, used, size)} {unit} ({told.symbols}{_legend(used, shape)})."
+        f"{listed(variables or ['nothing: it is constant'])}: {listed(words) or 'nothing'}. "
+        f"{told.letter} = {_formula(form, used, size)} {unit} "
+        f"({told.symbols}{_legend(used, shape)})."
     )
 
 
@@ -119,12 +121,3 @@ def _legend(used: dict[str, ClosureTerm], shape: Mapping[str, float | None]) -> 
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.0f} %"
-
-
-def _listed(words: Sequence[str]) -> str:
-    """Words with commas, the last with ``and``."""
-    if len(words) == 1:
-        return words[0]
-    if words:
-        return f"{', '.join(words[:-1])} and {words[-1]}"
-    return "nothing"

@@ -14,14 +14,7 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from pamrs._losses import Losses
-from pamrs.findings import (
-    HEALTHY,
-    BlockMismatch,
-    BlockVerdict,
-    ChannelError,
-    Findings,
-    Trace,
-)
+from pamrs.findings import HEALTHY, BlockMismatch, BlockVerdict, ChannelError, Findings, Trace
 from pamrs.report import figures, story
 from pamrs.report import text as words
 from pamrs.report.chain import chain_svg
@@ -33,32 +26,20 @@ _LEAST_CONDITION = 0.005  # share of the excess below which a condition is not t
 THROUGHOUT = 0.9
 """Share of a recording from which an excess is throughout it."""
 BADGES = {
-    "none": "nothing missing",
-    "parameters": "parameters inside their tolerances",
-    "effects": "missing physics named",
-    "unlisted": "missing physics, not in the catalogue",
-    "units": "a channel is in another unit",
+    "none": ("nothing missing", "nothing missing, but not settled"),
+    "parameters": ("parameters inside their tolerances", "parameters or physics, not settled"),
+    "effects": ("missing physics named", "missing physics, the name is not settled"),
+    "unlisted": ("missing physics, not in the catalogue", "missing physics, no name"),
+    "units": ("a channel is in another unit",) * 2,
+    "wrong": ("a value of the rig file is wrong", "a value of the rig file may be wrong"),
 }
-
-
-OPEN_BADGES = {
-    "none": "nothing missing, but not settled",
-    "parameters": "parameters or physics, not settled",
-    "effects": "missing physics, the name is not settled",
-    "unlisted": "missing physics, no name",
-    "units": "a channel is in another unit",
-}
-"""The same where several answers are left."""
-
-WRONG, PERHAPS_WRONG = "a value of the rig file is wrong", "a value of the rig file may be wrong"
-"""Badges of the verdict ``parameters`` where a value is named."""
+"""Verdicts in a few words, settled and where several answers are left; ``wrong`` is ``parameters``
+where a value is named."""
 
 
 def _badge(verdict: str, *, wrong: bool, is_open: bool) -> str:
     """A verdict in a few words, no surer than it is."""
-    if wrong and verdict == "parameters":
-        return PERHAPS_WRONG if is_open else WRONG
-    return (OPEN_BADGES if is_open else BADGES)[verdict]
+    return BADGES["wrong" if wrong and verdict == "parameters" else verdict][is_open]
 
 
 def _span(bounds: tuple[float, float] | None, digits: int = 3) -> str:
@@ -335,7 +316,7 @@ def render(diagnosis: Findings) -> str:
     str
         HTML text.
     """
-    losses = Losses()
+    losses, proposed = Losses(), diagnosis.next_experiment
     pictures = {
         name: _markup(losses.part(f"the picture of the {name}", partial(drawn, diagnosis)))
         for name, drawn in _PICTURES.items()
@@ -347,8 +328,7 @@ def render(diagnosis: Findings) -> str:
     recordings, hidden = losses.part(
         "the pictures of the recordings", partial(_recordings, diagnosis), ([], 0)
     )
-    bits = diagnosis.next_experiment.expected_information_bits
-    proposed = diagnosis.next_experiment
+    bits = proposed.expected_information_bits
     settings = getattr(diagnosis, "settings", None)
     page = partial(
         render_page,
@@ -377,9 +357,7 @@ def render(diagnosis: Findings) -> str:
         settings=settings.to_dict() if settings is not None else {},
         date=datetime.now().astimezone().isoformat(" ", "minutes"),
         data=". ".join(
-            text
-            for text in (words.data_sentence(diagnosis), words.left_out_sentence(diagnosis))
-            if text
+            filter(None, (words.data_sentence(diagnosis), words.left_out_sentence(diagnosis)))
         ),
         guarded=lambda what, caller: losses.part(f"the table of {what}", caller, ""),
         cells={"share": _share, "value": _value, "typeset": _typeset},

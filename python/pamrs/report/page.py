@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import jinja2
 from markupsafe import Markup
 
-
-def _version() -> str:
-    try:
-        return metadata.version("pamrs")
-    except metadata.PackageNotFoundError:
-        return ""
+from pamrs import __version__
 
 
 def render_page(template: Path, **content: Any) -> str:
@@ -37,4 +31,4 @@ def render_page(template: Path, **content: Any) -> str:
     )
     style = Path(__file__).with_name("style.css").read_text(encoding="utf-8")
     page = environment.from_string(template.read_text(encoding="utf-8"))
-    return page.render(style=Markup(style), version=_version(), **content)  # noqa: S704
+    return page.render(style=Markup(style), version=__version__, **content)  # noqa: S704

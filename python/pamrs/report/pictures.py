@@ -12,15 +12,7 @@ from matplotlib.figure import Figure
 from pamrs.findings import Findings
 from pamrs.report import story
 from pamrs.report.chain import draw_chain
-from pamrs.report.figures import (
-    COLOURS,
-    STYLE,
-    draw_panel,
-    free_head,
-    free_panels,
-    legend_below,
-    summary_figure,
-)
+from pamrs.report.figures import COLOURS, STYLE, draw_panels, free_head, free_panels, summary_figure
 from pamrs.rig import Rig
 
 
@@ -85,11 +77,7 @@ def _draw_first(part: Any, diagnosis: Findings, most: int) -> None:
     panels = free_panels(diagnosis)[:most]
     if not panels:
         return
-    every = part.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, panel in zip(every, panels, strict=True):
-        draw_panel(axes, panel, 0.9)
-    legend_below(part, every)
-    every[-1].set_xlabel("time [s]")
+    draw_panels(part, panels, 0.9)
     part.suptitle(free_head(diagnosis), x=0.03, ha="left", fontsize=9.5, fontweight="bold")
 
 

@@ -8,13 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis
-from pamrs.findings import (
-    HEALTHY,
-    BlockVerdict,
-    EffectFound,
-    EffectParameterFound,
-    Findings,
-)
+from pamrs.findings import HEALTHY, BlockVerdict, EffectFound, EffectParameterFound, Findings
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
@@ -175,7 +169,7 @@ def _listed(names: Sequence[str], most: int, last: str) -> str:
     told = list(names[:most])
     if len(names) > most:
         told.append(f"{len(names) - most} more")
-    return f" {last} ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    return words.listed(told, last)
 
 
 def _phrase(diagnosis: Findings, block: BlockVerdict, most: int) -> str:

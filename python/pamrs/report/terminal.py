@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import textwrap
+from functools import partial
 from typing import Final
 
 from pamrs.findings import Findings
@@ -11,6 +12,8 @@ from pamrs.report import story
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
+_wrapped = partial(textwrap.wrap, width=96, subsequent_indent="  ")
+"""A paragraph: narrower than the usual 100 letters of a terminal, so that none is broken there."""
 _ASCII: Final = str.maketrans({"°": "deg", "−": "-", "–": "-", "×": "x"})
 """Signs that a terminal may lack."""
 
@@ -19,7 +22,7 @@ def summary(diagnosis: Findings) -> str:
     """Return the result as plain text for a terminal."""
     lines = [f"Diagnosis of {diagnosis.case}", *textwrap.wrap(story.headline(diagnosis) + ".", 96)]
     left_out = words.left_out_sentence(diagnosis)
-    lines += textwrap.wrap(left_out + "." * bool(left_out), 96, subsequent_indent="  ")
+    lines += _wrapped(left_out + "." * bool(left_out))
     where = diagnosis.where.text
     if where:
         lines += [
@@ -47,22 +50,18 @@ def summary(diagnosis: Findings) -> str:
     lines += _fit(diagnosis)
     lines += _free_run(diagnosis)
     for kept in diagnosis.unexplained:
-        lines += textwrap.wrap(
-            f"Unexplained: {words.kept_sentence(kept)}", 96, subsequent_indent="  "
-        )
+        lines += _wrapped(f"Unexplained: {words.kept_sentence(kept)}")
     for asked in diagnosis.considered:
-        lines += textwrap.wrap(
-            f"Asked for: {words.considered_sentence(asked)}", 96, subsequent_indent="  "
-        )
+        lines += _wrapped(f"Asked for: {words.considered_sentence(asked)}")
     if len(diagnosis.ambiguity) > 1:
         sets = "; ".join(words.set_label(s) for s in diagnosis.ambiguity)
-        lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]
+        lines += ["", *_wrapped(f"Not separable: {sets}.")]
     for instruction in story.to_do(diagnosis)[: 1 if diagnosis.next_experiment.text else 2]:
-        lines += textwrap.wrap(f"On the bench: {instruction}", 96, subsequent_indent="  ")
+        lines += _wrapped(f"On the bench: {instruction}")
     lines += _next(diagnosis)
     lines += _data(diagnosis)
     for warning in diagnosis.warnings[:3]:
-        lines += textwrap.wrap(f"Warning: {warning}", 96, subsequent_indent="  ")
+        lines += _wrapped(f"Warning: {warning}")
     if len(diagnosis.warnings) > 3:
         lines.append(f"({len(diagnosis.warnings) - 3} more warnings in the report)")
     lines.append(f"{diagnosis.seconds:.1f} s")
@@ -103,7 +102,7 @@ def _free_run(diagnosis: Findings) -> list[str]:
             )
             told.append(f"{channel} {before} to {after} {unit}")
         text = f"Whole rig from its commands alone, {run.recording}: {'; '.join(told)}"
-        lines += textwrap.wrap(text.translate(_ASCII), 96, subsequent_indent="  ")
+        lines += _wrapped(text.translate(_ASCII))
     return lines
 
 
@@ -112,7 +111,7 @@ def _budget(diagnosis: Findings) -> list[str]:
     lines = []
     for block, sentence in words.budget_sentences(diagnosis):
         told = f"Budget of the {words.spoken_name(block)}: {sentence}".translate(_ASCII)
-        lines += textwrap.wrap(told, 96, subsequent_indent="  ")
+        lines += _wrapped(told)
     # where parameters alone take all there is nothing to read wrongly
     shares = [t for t in diagnosis.budget if t.kind != "unexplained"]
     plain = all(t.kind == "parameters" and 0.0 <= t.share <= 1.0 for t in shares)
@@ -124,7 +123,7 @@ def _budget(diagnosis: Findings) -> list[str]:
 def _data(diagnosis: Findings) -> list[str]:
     """What the answer rests on, and what of it was not used."""
     told = words.data_sentence(diagnosis)
-    return ["", *textwrap.wrap(told, 96, subsequent_indent="  ")] if told else []
+    return ["", *_wrapped(told)] if told else []
 
 
 def _next(diagnosis: Findings) -> list[str]:
@@ -132,7 +131,7 @@ def _next(diagnosis: Findings) -> list[str]:
     own = diagnosis.next_experiment
     if not own.text:
         return []
-    lines = ["", *textwrap.wrap(f"Next experiment: {own.text}", 96, subsequent_indent="  ")]
+    lines = ["", *_wrapped(f"Next experiment: {own.text}")]
     for pair, text in words.told_pairs(diagnosis):
         if own.pairs[0].between[0] in pair.between:
             between = " or ".join(words.hypothesis_label(name) for name in pair.between)

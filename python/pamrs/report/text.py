@@ -98,6 +98,11 @@ def hypothesis_label(key: str) -> str:
     return set_label(Hypothesis.parse(key).words)
 
 
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Names in a row: ``a, b and c``."""
+    return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
+
+
 def is_number(value: Any) -> TypeGuard[float]:
     """Whether `value` is a finite real number (NaN, infinities, None and text are not)."""
     try:

@@ -5,17 +5,13 @@ from __future__ import annotations
 import math
 
 from pamrs.findings import Misread
+from pamrs.report.text import listed
 from pamrs.units import bar_and_psi
-
-
-def _names(entry: Misread) -> str:
-    *first, last = entry.channels
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def misread_sentence(entry: Misread) -> str:
     """What is likely, and the evidence."""
-    names, many = _names(entry), len(entry.channels) > 1
+    names, many = listed(entry.channels), len(entry.channels) > 1
     verb = "are" if many else "is"
     if entry.offset:
         what = (
@@ -51,6 +47,6 @@ def misread_advice(entry: Misread) -> str:
         how += f", or with its calibration scale = {entry.gain:.4f},"
     return (
         f"No physics was judged, since a wrong unit looks like missing physics: {how} for "
-        f"{_names(entry)} (in the heading, or in case.toml), or check the sensor where the log "
-        "is right, and diagnose again."
+        f"{listed(entry.channels)} (in the heading, or in case.toml), or check the sensor where "
+        "the log is right, and diagnose again."
     )

@@ -37,13 +37,7 @@ def unknown_volumes(rig: Rig) -> list[str]:
     return [name for name in names if not rig.parameter(name).known]
 
 
-def verdict(
-    diagnosis: Findings,
-    case: Case,
-    forms: list[str],
-    *,
-    sought: bool,
-) -> str:
+def verdict(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
     """The verdict in a few sentences, behind what the whole rig misses from its commands alone, and
     what was not judged; ``forms`` say what a mismatch without a name is a function of, if that was
     ``sought``.
@@ -59,13 +53,7 @@ def verdict(
     return "\n\n".join([text, *told])
 
 
-def _of_blocks(
-    diagnosis: Findings,
-    case: Case,
-    forms: list[str],
-    *,
-    sought: bool,
-) -> str:
+def _of_blocks(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
     """The verdict of the blocks, in a few sentences."""
     kind = diagnosis.verdict
     missing = [b for b in diagnosis.judged if b.verdict == "unlisted"]

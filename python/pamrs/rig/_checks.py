@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from pamrs.rig.schema import BLOCKS, qualified, tables_of
@@ -118,15 +119,7 @@ def _positions(label: str, valve: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _joint(label: str, joint: Mapping[str, Any]) -> list[str]:
-    return _rising(label, "min_angle", "max_angle", "rad", joint)
-
-
-def _load(label: str, load: Mapping[str, Any]) -> list[str]:
-    return _rising(label, "min_length", "max_length", "m", load)
-
-
-def _rising(label: str, low: str, high: str, unit: str, table: Mapping[str, Any]) -> list[str]:
+def _rising(label: str, table: Mapping[str, Any], low: str, high: str, unit: str) -> list[str]:
     """Limits of a range that are the wrong way round."""
     if table[low] < table[high]:
         return []
@@ -138,10 +131,8 @@ def _rising(label: str, low: str, high: str, unit: str, table: Mapping[str, Any]
 
 def _link(label: str, link: Mapping[str, Any]) -> list[str]:
     """A link that nothing holds against its joint: the arm's mass matrix could not be solved."""
-    if (
-        link["inertia"] + link["mass"] * link["centre"] ** 2 + link["payload"] * link["length"] ** 2
-        > 0.0
-    ):
+    carried = link["mass"] * link["centre"] ** 2 + link["payload"] * link["length"] ** 2
+    if link["inertia"] + carried > 0.0:
         return []
     return [
         f"{label} has no inertia about its joint (inertia + mass centre^2 + payload length^2 = 0 "
@@ -160,10 +151,10 @@ def _vacuum(model: Mapping[str, Any], ambient: float) -> list[str]:
     ]
 
 
-_CHECKS = {
+_CHECKS: dict[str, Callable[[str, Mapping[str, Any]], list[str]]] = {
     "valve": _valve,
     "muscle": muscle_problems,
-    "joint": _joint,
+    "joint": partial(_rising, low="min_angle", high="max_angle", unit="rad"),
     "link": _link,
-    "load": _load,
+    "load": partial(_rising, low="min_length", high="max_length", unit="m"),
 }

@@ -15,6 +15,11 @@ from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
 
 Array = NDArray[np.float64]
+_LISTS = (
+    *("modulus_slope", "modulus_offset", "extension_factors"),
+    *("map_pressure", "map_contraction", "map_force"),
+)
+"""Parameters of several numbers."""
 _FRICTION = ("friction_coefficient", "friction_pressure_slope", "friction_floor")
 
 
@@ -132,37 +137,10 @@ class Muscle:
         extension_slope: float = 6.105,
         neck_floor: float = 0.80,
     ) -> None:
-        self._model: dict[str, Any] = {
-            "model": model,
-            "geometry": own_geometry(model) if geometry is None else geometry,
-            "count": count,
-            "rest_length": rest_length,
-            "rest_diameter": rest_diameter,
-            "braid_angle": braid_angle,
-            "wall_thickness": wall_thickness,
-            "modulus_slope": [float(v) for v in modulus_slope],
-            "modulus_offset": [float(v) for v in modulus_offset],
-            "c10": c10,
-            "c01": c01,
-            "bladder_modulus": bladder_modulus,
-            "extension_factors": [float(v) for v in extension_factors],
-            "map_pressure": [float(v) for v in map_pressure],
-            "map_contraction": [float(v) for v in map_contraction],
-            "map_force": [float(v) for v in map_force],
-            "modulus_scale": modulus_scale,
-            "softening": softening,
-            "temperature": temperature,
-            "reference_temperature": reference_temperature,
-            "friction_coefficient": friction_coefficient,
-            "friction_pressure_slope": friction_pressure_slope,
-            "friction_floor": friction_floor,
-            "friction_presliding": friction_presliding,
-            "buckling_load": buckling_load,
-            "k0": k0,
-            "contraction_slope": contraction_slope,
-            "extension_slope": extension_slope,
-            "neck_floor": neck_floor,
-        }
+        given = {name: value for name, value in locals().items() if name != "self"}
+        lists = {name: [float(v) for v in given[name]] for name in _LISTS}
+        shape = own_geometry(model) if geometry is None else geometry
+        self._model: dict[str, Any] = given | lists | {"geometry": shape}
         for name, value in self._model.items():
             for entry in value if isinstance(value, list) else [value]:
                 if isinstance(entry, (float, np.floating)):

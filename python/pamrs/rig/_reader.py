@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from pamrs._checks import as_said
 from pamrs._files import MOST_NAME, parse_toml, shown
 from pamrs.declared import unknown_key
 from pamrs.errors import ParameterError, RigError, joined
@@ -86,8 +87,7 @@ def read_model(text: str, source: str) -> Content:
 
 
 def _shown(value: object) -> str:
-    text = f"{value:g}" if isinstance(value, float) else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return f"{value:g}" if isinstance(value, float) else as_said(value)
 
 
 class Reader:

@@ -13,7 +13,7 @@ import copy
 import math
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -417,8 +417,7 @@ class Rig(View):
         if problems:
             raise ParameterError(joined(f"rig {self.name!r}", problems))
         known = {name: tol for name, tol in self._tolerances.items() if name not in gone}
-        found = Rig(self.name, model, known, self._effect_std, self.source, self._text)
-        return found._with_origin(self, numbers)
+        return replace(self, _model=model, _tolerances=known)._with_origin(self, numbers)
 
     @staticmethod
     def _is_count(dotted: str) -> bool:
@@ -443,7 +442,7 @@ class Rig(View):
         left = {full_name(old) for old in entries} - {full}
         kept = {name: known for name, known in self._effect_std.items() if name in left}
         model = {**self._model, "effects": entries}
-        found = Rig(self.name, model, self._tolerances, {**kept, **std}, self.source, self._text)
+        found = replace(self, _model=model, _effect_std={**kept, **std})
         own = {f"{full}.{name}": value for name, value in entry["parameters"].items()}
         if len(entries) > len(before):
             origin, numbers = self._grown_by(entry)
@@ -467,7 +466,7 @@ class Rig(View):
         """
         model = {name: value for name, value in self._model.items() if name != "case"}
         model |= {"case": folder} if folder else {}
-        return Rig(self.name, model, self._tolerances, self._effect_std, self.source, self._text)
+        return replace(self, _model=model)
 
     def _grown_by(self, entry: Entry) -> tuple[Rig, dict[str, float]]:
         """The rig that this one differs from by numbers with an effect more, and these numbers."""
@@ -476,9 +475,7 @@ class Rig(View):
         kind = kind_of_entry(entry)
         if kind not in grown:
             same = {**origin._model, "effects": [*origin._model["effects"], entry]}
-            grown[kind] = Rig(
-                self.name, same, self._tolerances, origin._effect_std, self.source, self._text
-            )
+            grown[kind] = replace(self, _model=same, _effect_std=origin._effect_std)
             object.__setattr__(origin, "_grown", grown)
         return grown[kind], before
 
@@ -554,7 +551,7 @@ class Rig(View):
         if self.own:
             model["own"] = [n for n in self.own if n.rpartition(".")[0] not in gone]
         kept = {name: std for name, std in self._effect_std.items() if name in left}
-        return Rig(self.name, model, self._tolerances, kept, self.source, self._text)
+        return replace(self, _model=model, _effect_std=kept)
 
     # ------------------------------------------------------------------ writing
 

@@ -12,30 +12,23 @@ from typing import Any, Final
 from pamrs.declared import BOOLEAN, NAME, NUMBER, TEXT, Rule, document, quantity, table
 from pamrs.effects import EFFECTS, EffectInfo, EffectParameter
 from pamrs.rig._model_error import ERROR_BLOCKS, ERROR_CHANNELS, STATED
-from pamrs.rig.schema import (
-    BLOCKS,
-    LIMITS,
-    PORTS,
-    REQUIRED_BLOCKS,
-    SCHEMA,
-    SINGLE_BLOCKS,
-    Key,
-)
+from pamrs.rig.schema import BLOCKS, LIMITS, PORTS, REQUIRED_BLOCKS, SCHEMA, SINGLE_BLOCKS, Key
 from pamrs.units import with_unit
 
 __all__ = ["rig_schema"]
 
+_OWN: Final = Rule({"const": "own"}, "", "another value in each recording")
 _SPREAD: Final = table(
     {
         "tol": Rule({**NUMBER, "minimum": 0}, "", "one standard deviation of what is known"),
         "unknown": Rule(BOOLEAN, "", "the value is sought, and only a placeholder"),
-        "error": Rule({"const": "own"}, "", "another value in each recording"),
+        "error": _OWN,
     }
 )["properties"]
 _STD: Final = table(
     {
         "std": Rule({**NUMBER, "minimum": 0}, "", "standard deviation of the value"),
-        "error": Rule({"const": "own"}, "", "another value in each recording"),
+        "error": _OWN,
     }
 )["properties"]
 _BLOCK_NAME: Final = "^[A-Za-z0-9_-]+$"

@@ -7,7 +7,7 @@ import os
 import secrets
 import tempfile
 import zipfile
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -121,12 +121,7 @@ async def _received(request: Request, file: Path) -> None:
 async def _upload(studio: Studio, request: Request) -> None:
     target = studio.new_log(request.query_params.get("name", ""))
     await _received(request, target)
-    await run_in_threadpool(_take, studio, target)
-
-
-def _take(studio: Studio, log: Path) -> None:
-    with studio.lock:
-        studio.take(log)
+    await run_in_threadpool(studio.take, target)
 
 
 def _did(studio: Studio, what: str, given: dict[str, Any]) -> None:
@@ -238,12 +233,6 @@ def make_app(studio: Studio, token: str) -> ASGIApp:
         Route("/progress", progress),
         Route("/result/{name}", result),
         Route("/case.zip", take_away),
-        *(Route(f"/{what}", _acting(act, what), methods=["POST"]) for what in acts),
+        *(Route(f"/{what}", partial(act, what), methods=["POST"]) for what in acts),
     ]
     return _Guard(Starlette(routes=routes), token)
-
-
-def _acting(
-    act: Callable[[str, Request], Awaitable[Response]], what: str
-) -> Callable[[Request], Awaitable[Response]]:
-    return partial(act, what)

@@ -18,13 +18,7 @@ from pamrs._writing import write_atomically
 from pamrs.diagnosis import Diagnosis
 from pamrs.diagnosis.result import load_result
 from pamrs.errors import CaseError, PamrsError, ParameterError
-from pamrs.recordings import (
-    LogProposal,
-    Proposal,
-    channels_of,
-    load_case,
-    propose,
-)
+from pamrs.recordings import LogProposal, Proposal, channels_of, load_case, propose
 from pamrs.recordings.logs import check_readable
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig
@@ -261,12 +255,13 @@ class Studio:
         RecordingError, MissingPackageError
             If it cannot be read.
         """
-        try:
-            self._proposed(log)
-        except BaseException:
-            log.unlink()
-            raise
-        self.changed()
+        with self.lock:
+            try:
+                self._proposed(log)
+            except BaseException:
+                log.unlink()
+                raise
+            self.changed()
 
     @property
     def foreign(self) -> bool:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._normal import solve_normal
+from pamrs._arrays import solve_normal
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, bin_width, free_baseline, residuals
 from pamrs.diagnosis.noise import bins_of, noise_levels

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._normal import solve_normal
+from pamrs._arrays import solve_normal
 from pamrs.diagnosis.fit import (
     FIT_BIN_TIME,
     Key,

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs._stretches import stretches
+from pamrs._arrays import stretches
 from pamrs.channels import block_of, channel_of, dotted, with_trait
 from pamrs.diagnosis.prepare._blocks import Block, predicted
 from pamrs.diagnosis.prepare._signals import Prepared, moves_by_gauges

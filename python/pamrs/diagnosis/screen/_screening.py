@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs._normal import solve_normal
+from pamrs._arrays import solve_normal
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import (
     Fit,

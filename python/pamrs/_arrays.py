@@ -1,4 +1,6 @@
-"""Normal equations that can be solved whatever scales their unknowns have."""
+"""Of arrays: stretches in which something holds, and solutions of normal equations, whatever scales
+their unknowns have.
+"""
 
 from __future__ import annotations
 
@@ -38,3 +40,21 @@ def solve_normal(normal: Array, right: Array) -> Array:
     scaled[np.diag_indices_from(scaled)] += _RIDGE * len(size)
     rows = (slice(None), *([None] * (right.ndim - 1)))
     return np.asarray(np.linalg.solve(scaled, right / size[rows]) / size[rows])
+
+
+def stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Where a flag stays set.
+
+    Parameters
+    ----------
+    flags : ndarray of bool, shape (n,)
+        One flag for each sample.
+
+    Returns
+    -------
+    list of (start, stop)
+        Sample indices, ``stop`` excluded.
+    """
+    padded = np.concatenate([[False], flags, [False]])
+    edges = np.flatnonzero(padded[1:] != padded[:-1])
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
