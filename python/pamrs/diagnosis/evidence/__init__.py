@@ -12,6 +12,7 @@ Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_
 from __future__ import annotations
 
 from pamrs.diagnosis.evidence._candidates import (
+    FAR_BEHIND,
     Attempts,
     BlockGroup,
     Candidate,
@@ -51,6 +52,7 @@ from pamrs.diagnosis.evidence._weighing import (
 )
 
 __all__ = [
+    "FAR_BEHIND",
     "WALL_TOLERANCES",
     "FORM_SHARE_ALIKE",
     "Attempts",

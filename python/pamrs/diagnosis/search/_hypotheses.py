@@ -907,7 +907,9 @@ def _shortlist(
 
     def begin(starts: dict[Term, list[Start]]) -> None:
         tasks = [(e, start) for e, own in starts.items() for start in own]
-        tried = two_at_a_time(lambda one: trial.fit_shortly([one[1]], baseline), tasks)
+        least = min((c.fit.cost for own in short.values() for c in own), default=math.inf)
+        each = [[start] for _, start in tasks]
+        tried = trial.fit_within_reach(each, baseline, most=settings.most_singles, least=least)
         for effect in starts:
             own = [c for (e, _), c in zip(tasks, tried, strict=True) if e == effect]
             known = [*short.get(effect, []), *(c for c in own if c is not None)]

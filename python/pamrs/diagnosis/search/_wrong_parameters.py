@@ -16,7 +16,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import WALL_TOLERANCES, Attempts, BlockGroup, Candidate, significant
+from pamrs.diagnosis.evidence import (
+    FAR_BEHIND,
+    WALL_TOLERANCES,
+    Attempts,
+    BlockGroup,
+    Candidate,
+    significant,
+)
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -39,8 +46,6 @@ FURTHER_SHARE = 0.2
 _LEAST_PREDICTED_GAIN = 9.2
 # freed parameters, and pairs of them, that are fitted to their end (decision 25)
 _MOST_FINISHED = 3
-# times the misfit of a freed parameter that leaves noise, for others fitted beside it
-_NEAR_MISFIT = 2.0
 # [tolerances] moved by a suspect beside effects, which take a part of what it would do
 _FAR_TOLERANCES = 2.0
 _MOST_BESIDE = 2  # parameters at their wall that are freed beside the effects that leave least
@@ -206,9 +211,8 @@ def _fit_freed(
     short = {names: c for names, c in begun if c is not None}
     worth = [names for names in short if not _needless(names, short, trial)]
     best = sorted(worth, key=lambda names: short[names].misfit)[:_MOST_FINISHED]
-    if best and not any(significant(e) for e in short[best[0]].fitted.values()):
-        # what leaves much more than one that leaves noise does not get there
-        near = _NEAR_MISFIT * short[best[0]].misfit
+    if best:
+        near = FAR_BEHIND * short[best[0]].misfit
         best = [names for names in best if short[names].misfit <= near]
     return {**short, **to_the_end(best)}
 
