@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem, fit, predicted_with_doubt, residuals, stacked
-from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.recordings import Recording
-from pamrs.simulation import core_rig
-from tests.diagnosis.noisy import SHOULDER, noisy
+from tests.diagnosis.asked import problem_of
+from tests.diagnosis.noisy import SHOULDER, driven
 
-SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
 WHITE = {"chamber": 1.0}
 
@@ -22,16 +19,8 @@ def run(truth: pamrs.Rig, name: str, swing: float, seed: int) -> Recording:
     """Eight seconds about the null of the valve, which stays shut without a swing."""
     dt = 0.01
     command = 5.0 + swing * np.sin(1.7 * dt * np.arange(800))
-    made = pamrs.simulate(truth, command, sample_time=dt, initial={"muscle_pressure": 2e5})
-    channels = {"valve_command": command} | {channel: made[channel] for channel in SHOULDER}
-    return noisy(name, "fit", dt, channels, SHOULDER, [44, seed])
-
-
-def problem(*recordings: Recording) -> Problem:
-    blocks = available_blocks(RIG, ("valve_command", *SHOULDER))
-    chamber = [block for block in blocks if block.name == "chamber"]
-    prepared = [prepare(recording, RIG, SETTINGS) for recording in recordings]
-    return Problem(chamber, prepared, core_rig(RIG), SETTINGS)
+    given, start = {"valve_command": command}, {"muscle_pressure": 2e5}
+    return driven(truth, name, "fit", dt, given, SHOULDER, [44, seed], initial=start)
 
 
 def power(there: Problem, found: dict[tuple[str, str], object]) -> float:
@@ -46,9 +35,9 @@ def test_what_the_fit_leaves_open_is_no_mismatch_and_anything_else_is(
     # shut, a valve says nothing of its area, which is 1.8 tolerances off
     area = RIG.parameter("valve.discharge_area_max")
     truth = RIG.with_parameters({area.name: area.value + 1.8 * area.tol})
-    shut = problem(run(truth, "shut", 0.0, 1))
+    shut = problem_of(RIG, [run(truth, "shut", 0.0, 1)], "chamber")
     there = truth.with_effect("leak_muscle", {"conductance": leak}) if leak else truth
-    moving = problem(run(there, "moving", 0.3, 2))
+    moving = problem_of(RIG, [run(there, "moving", 0.3, 2)], "chamber")
     found = fit(shut, RIG, (), {}, WHITE)
     assert found.std[area.name] > 0.9 * area.tol
     plain = power(moving, residuals(moving, found.rig))

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, possible_gain, weigh
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.evidence._verdicts import _capped
@@ -24,10 +23,10 @@ from pamrs.diagnosis.search import _hypotheses
 from pamrs.effects import EFFECTS, NONE, UNLISTED, Hypothesis, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
-from tests.diagnosis.likelihoods import TIMES, leaving, rows_of
+from tests.diagnosis.asked import SETTINGS
+from tests.diagnosis.likelihoods import TIMES, made_up, rows_of
 from tests.diagnosis.terms import by_text, terms
 
-SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
 BLOCKS = available_blocks(RIG, ("valve_command", *again.NOISE))
 ARM = [b for b in BLOCKS if b.name == "arm"]
@@ -52,13 +51,10 @@ def hypothesis(
     values = {name: value for name, (value, _) in known.items()}
     std = {name: spread for name, (_, spread) in known.items()}
     spreads = np.array(list(std.values()))
-    covariance = np.outer(spreads, spreads) * (
-        correlation + (1.0 - correlation) * np.eye(len(spreads))
-    )
-    scales = dict.fromkeys(values, 1.0)
-    fit = Fit(terms(*effects), RIG, values, std, covariance, 0.0, {}, scales=scales, events=events)
+    alike = correlation + (1.0 - correlation) * np.eye(len(spreads))
+    fitted = {"std": std, "covariance": np.outer(spreads, spreads) * alike, "events": events}
     kept = {"arm": Excess(1.0 + left * (BEFORE - 1.0), 0.0, 0.5, 1.0, 1.0, 1.2, 0.05)}
-    return Candidate(terms(*effects), fit, kept, kept, 0.0, likelihood=leaving(kept))
+    return made_up(RIG, "+".join(effects), kept, values, **fitted)
 
 
 def weighed(*found: Candidate) -> dict[str, float]:
@@ -104,18 +100,8 @@ def test_a_value_far_from_its_prior_is_rare_and_not_ruled_out() -> None:
 def test_how_far_a_value_is(name: str, value: float, distance: float | None) -> None:
     nominal, tolerance = 1.0, 0.1
     moved = (value - nominal) / tolerance
-    fit = Fit(
-        (),
-        RIG,
-        {name: value},
-        {},
-        np.zeros((1, 1)),
-        0.0,
-        {},
-        {name: moved},
-        scales={name: tolerance},
-    )
-    found = replace(hypothesis({}, 0.0), fit=fit, wrong=(name,))
+    known = {"moved": {name: moved}, "scales": {name: tolerance}}
+    found = made_up(RIG, name, {}, {name: value}, **known)
     expected = abs(moved) if distance is None else max(distance, abs(moved))
     assert found.outside(1.0) == pytest.approx(math.log(expected))
 
@@ -283,9 +269,8 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
     }
     found, _, _ = _hypotheses._shortlist(search, [[term] for term in ranked], ranked)
     assert [term.id for term in found] == ["muscle_rate_damping"]
-    assert sorted(asked) == sorted(
-        [(effect, 1.0) for effect in keys] + [("muscle_rate_damping", 2.0)]
-    )
+    every = [*((effect, 1.0) for effect in keys), ("muscle_rate_damping", 2.0)]
+    assert sorted(asked) == sorted(every)
 
 
 @pytest.mark.parametrize(
