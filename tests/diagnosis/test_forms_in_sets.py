@@ -20,8 +20,8 @@ from pamrs.diagnosis.screen import screen
 from pamrs.diagnosis.search._sets import _STRONG_RATIO, Search, far_above_noise, in_best_forms
 from pamrs.effects import Term
 from tests.diagnosis.again import case
-from tests.diagnosis.asked import problem_of
-from tests.diagnosis.held import RIG, SETTINGS, attempts
+from tests.diagnosis.asked import SETTINGS, problem_of
+from tests.diagnosis.held import RIG, attempts
 from tests.diagnosis.terms import terms
 
 SHOULDER = pamrs.rigs.shoulder()

@@ -42,11 +42,8 @@ def test_json_follows_schema(make, tmp_path: Path) -> None:
 
 def test_schema_is_closed() -> None:
     content = synthetic.diagnosis().to_dict()
-    for change in (
-        {"extra": 1},
-        {"verdict": "perhaps"},
-        {"where": {**content["where"], "extra": 1}},
-    ):
+    inside = {"where": {**content["where"], "extra": 1}}
+    for change in ({"extra": 1}, {"verdict": "perhaps"}, inside):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**content, **change}, schema())
 
@@ -64,14 +61,10 @@ def test_not_finite_becomes_null() -> None:
 
 
 def test_numpy_values_become_json() -> None:
-    where = {
-        "block": "arm",
-        "intervals": np.array([[0.0, 1.0]]).tolist(),
-        "conditions": [Condition("time", float(np.float32(0.5)), 0.25, 1.0, "late")],
-    }
-    content = json.loads(
-        synthetic.diagnosis(where=where, probabilities={"none": np.float64(0.25)}).to_json()
-    )
+    condition = Condition("time", np.float64(0.5), 0.25, 1.0, "late")
+    where = {"block": "arm", "intervals": [[0.0, 1.0]], "conditions": [condition]}
+    found = synthetic.diagnosis(where=where, probabilities={"none": np.float64(0.25)})
+    content = json.loads(found.to_json())
     told = {"name": "time", "share": 0.5, "time": 0.25, "mean": 1.0, "text": "late"}
     assert content["where"]["conditions"] == [told]
     assert content["probabilities"] == {"none": 0.25}
@@ -106,32 +99,25 @@ def test_a_plain_number_stands_without_its_unit() -> None:
 
 def test_an_instruction_that_pairs_share_is_given_once() -> None:
     what = "For the chamber of flexor: step the pressure by two sizes and watch for 4 s"
-    own = NextExperiment(
-        f"{what}; what fades is heat.",
-        pairs=[
-            PairExperiment(["unlisted", "leak_muscle"], f"{what}. A model with a leak says it."),
-            PairExperiment(
-                ["unlisted", "sensors.flexor.pressure_zero"], "Measure it by itself with a gauge."
-            ),
-        ],
-    )
+    zero = ["unlisted", "sensors.flexor.pressure_zero"]
+    pairs = [
+        PairExperiment(["unlisted", "leak_muscle"], f"{what}. A model with a leak says it."),
+        PairExperiment(zero, "Measure it by itself with a gauge."),
+    ]
+    own = NextExperiment(f"{what}; what fades is heat.", pairs=pairs)
     found = dataclasses.replace(synthetic.diagnosis(), next_experiment=own)
     summary = " ".join(found.summary().split())
     assert summary.count("watch for 4 s") == 1
-    assert (
-        "effect outside the catalogue or muscle leak? The same experiment. A model with a leak"
-        in summary
-    )
+    same = "effect outside the catalogue or muscle leak? The same experiment. A model with a leak"
+    assert same in summary
     assert "or wrong pressure zero of flexor? Measure it by itself" in summary
-    html = render_html(found)
-    assert html.count("watch for 4 s") == 1
+    assert render_html(found).count("watch for 4 s") == 1
 
 
 def test_errors_of_a_block_with_a_name_have_their_unit() -> None:
     found = synthetic.diagnosis()
-    errors = dataclasses.replace(
-        found.fit, held_out={"joint_angle.elbow": found.fit.held_out["joint_angle"]}
-    )
+    named = {"joint_angle.elbow": found.fit.held_out["joint_angle"]}
+    errors = dataclasses.replace(found.fit, held_out=named)
     lines = dataclasses.replace(found, fit=errors).summary().splitlines()
     assert any(line.startswith("joint_angle.elbow [deg]") for line in lines)
 
@@ -151,23 +137,13 @@ ARM = {"blocks": ["arm"], "ambiguity": [], "wrong_parameters": [], "effects": []
 def _judged(verdict: str, probabilities: dict[str, float], **more: Any) -> Diagnosis:
     """A result of one group of blocks."""
     block = BlockVerdict(verdict=verdict, probabilities=probabilities, **(ARM | more))
-    effects = [
-        {
-            "id": name,
-            "probability": sum(p for key, p in probabilities.items() if name in key.split("+")),
-            "parameters": {},
-        }
-        for name in block.effects
-    ]
-    return synthetic.diagnosis(
-        verdict=verdict,
-        probabilities=probabilities,
-        effects=effects,
-        ambiguity=block.ambiguity,
-        blocks=[block],
-        where={"block": "arm"},
-        traces=[],
-    )
+    effects = []
+    for name in block.effects:
+        chance = sum(p for key, p in probabilities.items() if name in key.split("+"))
+        effects.append({"id": name, "probability": chance, "parameters": {}})
+    case = {"verdict": verdict, "probabilities": probabilities, "ambiguity": block.ambiguity}
+    more = {"blocks": [block], "where": {"block": "arm"}, "traces": []}
+    return synthetic.diagnosis(effects=effects, **case, **more)
 
 
 @pytest.mark.parametrize(
