@@ -19,8 +19,6 @@ from reproduction.chapter2 import ends, sample, say
 from reproduction.page import Picture
 from reproduction.stand_in import EXTENSION, LEVELS, ORDERS, PSI, THREE, Fits, stand_in
 
-__all__ = ["pictures"]
-
 Array = NDArray[np.float64]
 
 _MM: Final = 1e3
@@ -179,8 +177,8 @@ def _bands(cell: Axes, sets: list[tuple[str, str, Array]]) -> None:
         at = places + 0.16 * (k - 0.5 * (len(sets) - 1))
         middle = np.median(values, axis=0)
         reach = np.abs(np.array([values.min(axis=0), values.max(axis=0)]) - middle)
-        style = {"fmt": "o", "ms": 4, "lw": 1.0, "color": colour, "label": label}
-        cell.errorbar(at, 100.0 * middle, yerr=100.0 * reach, **style)
+        dots: dict[str, Any] = {"fmt": "o", "ms": 4, "lw": 1.0, "color": colour}
+        cell.errorbar(at, 100.0 * middle, yerr=100.0 * reach, label=label, **dots)
     cell.set_xticks(places, [f"{psi:g}" for psi in LEVELS])
     cell.set(xlabel="pressure [psi]", ylabel="error (2.37) [%]")
     cell.set_ylim(bottom=0.0)

@@ -20,8 +20,6 @@ from reproduction.chapter3 import say, step_by_area
 from reproduction.elbow import FOOT_POUND, PSI
 from reproduction.page import Picture
 
-__all__ = ["pictures"]
-
 _COLOUR: Final = {"conserving": COLOURS["after"], "printed": COLOURS["before"]}
 _NAMES: Final = {
     "conserving": "torque that conserves power",
@@ -176,8 +174,8 @@ def _lift() -> Figure:
 def _mark(axes: Axes, level: float, text: str, *, at: float = 1.0) -> None:
     """A published number as a dashed line."""
     axes.axhline(level, **_DASHED)
-    place = {"xycoords": ("axes fraction", "data"), "color": _INK}
-    axes.annotate(text, (at, level), (-3, 3), **place, **_NOTE)
+    place = ("axes fraction", "data")
+    axes.annotate(text, (at, level), (-3, 3), xycoords=place, color=_INK, **_NOTE)
 
 
 def _step() -> Figure:

@@ -30,10 +30,6 @@ from reproduction.margins import loop_margin
 from reproduction.statement_tables import Told
 from reproduction.statements import OTHER, OWN, TRIAL, Lines
 
-__all__ = ["DAMPED", "PRINTED", "RUBBING", "SMOOTH", "agreed", "experiments", "facts", "in_short"]
-__all__ += ["latest", "say", "tables"]
-
-
 #: Names of the plants, see :data:`reproduction.lift.VARIANTS`: the one of the score, the
 #: library's muscle with hysteresis and without, and that with damping.
 PRINTED: Final = "as printed"

@@ -15,12 +15,10 @@ from matplotlib.figure import Figure
 
 from pamrs.report.figures import COLOURS
 from reproduction import drawing, lift
-from reproduction.chapter4 import PRINTED, RUBBING, SMOOTH, agreed, latest, say
-from reproduction.chapter4_statements import SERIES, statements
+from reproduction.chapter4 import PRINTED, RUBBING, SMOOTH, agreed, latest
+from reproduction.chapter4_statements import SERIES, say, statements
 from reproduction.lift import Lifts
 from reproduction.page import Picture
-
-__all__ = ["pictures"]
 
 _PAYLOAD: Final = ("#56b4e9", "#0072b2", "#d55e00", "#1f1f1f")
 _NAMES: Final = ("11 kg", "23 kg", "34 kg", "45 kg")

@@ -15,8 +15,6 @@ from reproduction.elbow import PSI
 from reproduction.lift import Lifts
 from reproduction.statements import Statements
 
-__all__ = ["SERIES", "on_stop", "restless", "say", "statements"]
-
 #: The statements of the chapter.
 say: Final = Statements("chapter4")
 

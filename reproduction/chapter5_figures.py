@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
@@ -18,8 +18,6 @@ from reproduction.chapter5_statements import say
 from reproduction.page import Picture
 from reproduction.tracking import KINDS, PAYLOADS, Track
 from reproduction.tracking_runs import FULL, LATER, MIDDLE, STARTS, TRIALS, WRONG, Plan
-
-__all__ = ["pictures"]
 
 _INK: Final = "#1f1f1f"
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d1f")
@@ -91,9 +89,9 @@ def _sliding(plan: Plan) -> Figure:
             square.plot(*shown, color=_COLOURS[k], lw=1.3, ls=style)
         square.plot([], [], color=_INK, ls=style, label=f"{payload:g} lb")
     square.axhline(400.0, color=_INK, lw=0.7)
-    words, place = "top of the axis of Fig. 5.8(c)", ("axes fraction", "data")
-    points = {"xycoords": place, "textcoords": "offset points", "fontsize": 8}
-    square.annotate(words, (0.01, 400.0), (0, 3), **points)
+    top, place = "top of the axis of Fig. 5.8(c)", ("axes fraction", "data")
+    points: dict[str, Any] = {"xycoords": place, "textcoords": "offset points", "fontsize": 8}
+    square.annotate(top, (0.01, 400.0), (0, 3), **points)
     _squares(square, ())
     square.set(xlim=(0.0, float(run.time[-1])), ylim=(5.0, 4e4))
     square.legend(loc="upper right", ncols=3, fontsize=8)

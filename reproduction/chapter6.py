@@ -32,8 +32,6 @@ from reproduction.rigs import with_struts
 from reproduction.statement_tables import Told
 from reproduction.statements import OTHER, Statements
 
-__all__ = ["experiments", "facts", "headings", "in_short", "latest", "say", "tables"]
-
 #: The statements of the chapter.
 say: Final = Statements("chapter6")
 

@@ -19,8 +19,6 @@ from reproduction.chapter6 import BAR, latest, say
 from reproduction.page import Picture
 from reproduction.recruiting import EXTENDED, MATRIX, MUSCLES, PAYLOADS, Cycles
 
-__all__ = ["pictures"]
-
 _COLOUR: Final = dict(zip(MUSCLES, ("#d55e00", "#0072b2", "#1f1f1f"), strict=True))
 _BAND: Final[dict[str, Any]] = {"color": "#c4c8ce", "alpha": 0.5, "zorder": 0, "lw": 0.0}
 
@@ -130,8 +128,8 @@ def _readings() -> Figure:
             done[name], (COLOURS["before"], COLOURS["after"]), (0.13, -0.13), strict=True
         ):
             values = 100.0 * np.array([found.of(*case) for case in MATRIX[90.0]])
-            ends, bar = [values.min(), values.max()], {"lw": 3.0, "solid_capstyle": "butt"}
-            cell.plot(ends, [place + shift] * 2, color=colour, **bar)
+            ends = [values.min(), values.max()]
+            cell.plot(ends, [place + shift] * 2, color=colour, lw=3.0, solid_capstyle="butt")
             cell.plot(values, [place + shift] * values.size, "|", ms=7, color="#1f1f1f", mew=0.8)
     cell.set_yticks(range(len(names)), names)
     cell.set_xlabel("efficiency [%]")

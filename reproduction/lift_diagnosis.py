@@ -28,7 +28,6 @@ from reproduction.lift import (
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis
 
-__all__ = ["NOISE", "diagnosed", "recorded"]
 
 #: Standard deviation of each sensor, SI; the command is known.
 NOISE: Final = {
