@@ -72,16 +72,8 @@ def recorded(
     }
     channels["valve_command"] = run.command
     mask = {name: np.ones(n, dtype=bool) for name in channels}
-    return Recording(
-        f"{path.name}_{seed}",
-        role,
-        run.time,
-        PERIOD,
-        channels,
-        mask,
-        [],
-        dict.fromkeys(channels, "SI"),
-    )
+    name, units = f"{path.name}_{seed}", dict.fromkeys(channels, "SI")
+    return Recording(name, role, run.time, PERIOD, channels, mask, [], units)
 
 
 def diagnosed(name: str, *, payload: float = PAYLOADS[1], duration: float = 25.0) -> Diagnosis:
