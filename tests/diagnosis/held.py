@@ -26,12 +26,15 @@ def hold(
     name: str = "hold",
     seed: int = 1,
     step: float | None = 0.01,
+    start: float = 7e5,
     **leak: float,
 ) -> Recording:
-    """The chamber from 7 bar at 10 Hz with 150 Pa of noise, with a leak (0 for none)."""
+    """The chamber from 7 bar, or another pressure [Pa], at 10 Hz with 150 Pa of noise, with a leak
+    (0 for none).
+    """
     known = {"conductance": conductance, **leak}
     truth = RIG.with_effect("leak_muscle", known) if conductance else RIG
-    begin = {"muscle_pressure": 7e5}
+    begin = {"muscle_pressure": start}
     given = {"duration": seconds, "step": step, "initial": begin}
     return driven(truth, name, "fit", 0.1, {}, {"muscle_pressure": 150.0}, [seed], **given)
 

@@ -101,16 +101,9 @@ def test_a_diagnosis_says_what_it_did_not_judge() -> None:
 def fills(duration: float, *channels: str) -> Outcome:
     """What a set pressure that begins far above the chamber would tell of two time constants."""
     command = np.full(round(duration / DT), 4e5)
-    done = Experiment(
-        "fill",
-        "open the stopcock",
-        {"kind": "fill"},
-        command,
-        command.size,
-        DT,
-        {"supply_pressure": 4e5, "muscle_pressure": 0.0},
-        channel="supply_command",
-    )
+    start = {"supply_pressure": 4e5, "muscle_pressure": 0.0}
+    given = ("fill", "open the stopcock", {"kind": "fill"}, command, command.size, DT, start)
+    done = Experiment(*given, channel="supply_command")
     nominal = parse_rig(LIMITED.replace(", tol = 0.01 }", " }", 1))  # of the time constant
     slow = nominal.with_parameters({"supply.time_constant": 0.2})
     hypotheses = [("none", nominal, 0.5), ("supply.time_constant", slow, 0.5)]

@@ -41,39 +41,14 @@ from tests.diagnosis import synthetic
 from tests.diagnosis.asked import SETTINGS
 from tests.diagnosis.noisy import whole
 from tests.simulation.test_spools import PAIR
+from tests.tables import text_of
 
 JOINT = pamrs.rigs.antagonistic_joint()
 TWO = pamrs.rigs.named("two_joint_arm")
 REGULATED = pamrs.rigs.named("regulated_joint")
 PULSED = parse_rig(PAIR)
 SIDES = ("flexor", "extensor")
-REGULATORS = """
-schema = "pamrs.rig/1"
-name = "two_regulators"
-[gas]
-[limits]
-max_pressure = { value = 4, unit = "bar" }
-""" + "".join(
-    f"""
-[supply.{side}]
-kind             = "regulator"
-initial_pressure = {{ value = 1, unit = "bar" }}
-time_constant    = {{ value = 0.1, unit = "s", tol = 0.02 }}
-[line.{side}]
-kind     = "tube"
-from     = "supply.{side}"
-to       = "chamber.{side}"
-length   = {{ value = 2, unit = "m", tol = 0.05 }}
-diameter = {{ value = 4, unit = "mm", tol = 0.05 }}
-[chamber.{side}]
-dead_volume      = {{ value = 0.3, unit = "l", tol = 0.01 }}
-initial_pressure = {{ value = 1, unit = "bar" }}
-alpha_in  = {{ value = 1.3, unit = "1" }}
-alpha_out = {{ value = 1.1, unit = "1" }}
-alpha     = {{ value = 1.2, unit = "1" }}
-"""
-    for side in ("left", "right")
-)
+REGULATORS = text_of(__file__, "two_regulators")
 
 
 def only(rig: Rig, *names: str, **options) -> list[Experiment]:

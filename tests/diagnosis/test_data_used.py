@@ -232,16 +232,10 @@ def test_masked_samples_say_nothing_of_the_room() -> None:
 
 def test_a_recorded_temperature_of_the_gas_is_compared_by_a_replay() -> None:
     """Air that is let out cools; a thermometer that reads 2 K too much shows there."""
-    rig = parse_rig(
-        NOZZLE.to_toml_text()
-        .replace(
-            "[chamber]",
-            '[chamber]\ngas = "energy_balance"\n'
-            'heat_transfer_coefficient = { value = 20.0, unit = "W/(m2 K)" }',
-            1,
-        )
-        .replace("alpha", "# alpha")
-    )
+    gas = 'gas = "energy_balance"'
+    wall = 'heat_transfer_coefficient = { value = 20.0, unit = "W/(m2 K)" }'
+    text = NOZZLE.to_toml_text().replace("alpha", "# alpha")
+    rig = parse_rig(text.replace("[chamber]", f"[chamber]\n{gas}\n{wall}", 1))
     made = pamrs.simulate(rig, duration=20.0, sample_time=0.02, initial={"muscle_pressure": 5e5})
     assert made["temperature"].min() < 289.0
     pressure, gas = made["muscle_pressure"], made["temperature"] + 2.0

@@ -14,46 +14,10 @@ from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import replay
 from tests.diagnosis.asked import blocks_of, diagnosed, names_value
 from tests.diagnosis.noisy import GAUGES, driven
+from tests.tables import text_of
 
 NOISE = {"supply_pressure": 400.0, "line_pressure": 400.0, "muscle_pressure": 400.0}
-CHAMBER = """
-[chamber]
-dead_volume = { value = 0.4, unit = "l", tol = 0.004 }
-alpha_in    = { value = 1.2, unit = "1", tol = 0.03 }
-alpha_out   = { value = 1.15, unit = "1", tol = 0.03 }
-alpha       = { value = 1.15, unit = "1", tol = 0.03 }
-[sensors]
-pressure_zero = { value = 0, unit = "Pa", tol = 1000 }
-"""
-REGULATED = f"""
-schema = "pamrs.rig/1"
-name = "regulated"
-[gas]
-[supply]
-kind             = "regulator"
-initial_pressure = {{ value = 0.5, unit = "bar" }}
-time_constant    = {{ value = 0.08, unit = "s", tol = 0.01 }}
-[line]
-length   = {{ value = 2.0, unit = "m", tol = 0.02 }}
-diameter = {{ value = 4.0, unit = "mm", tol = 0.05 }}
-{CHAMBER}"""
-FED = f"""
-schema = "pamrs.rig/1"
-name = "fed"
-[gas]
-[supply]
-volume           = {{ value = 15, unit = "l", tol = 0.3 }}
-initial_pressure = {{ value = 7, unit = "bar", tol = 0.1 }}
-[valve]
-discharge_area_max = {{ value = 3, unit = "mm2", tol = 0.1 }}
-null_voltage       = {{ value = 5.0, unit = "V", tol = 0.01 }}
-half_range         = {{ value = 5.0, unit = "V" }}
-area_fraction      = {{ opening = [0.0, 1.0], fraction = [0.0, 1.0] }}
-[line]
-length       = {{ value = 8.0, unit = "m", tol = 0.05 }}
-diameter     = {{ value = 4.0, unit = "mm", tol = 0.03 }}
-inlet_volume = {{ value = 5, unit = "ml", tol = 1 }}
-{CHAMBER}"""
+REGULATED, FED = (text_of(__file__, name) for name in ("gauged_regulator", "fed"))
 
 
 def recorded(rig: Rig, role: str, seed: int) -> Recording:

@@ -1,4 +1,6 @@
-"""Result of a diagnosis: JSON, summary, validation."""
+"""Result of a diagnosis: JSON, summary, validation; what is read from its file is what was
+written.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,10 @@ import jsonschema
 import numpy as np
 import pytest
 
+import pamrs
 from pamrs.diagnosis.result import Diagnosis, Trace, schema
 from pamrs.diagnosis.schema import FILE, is_current
+from pamrs.errors import DiagnosisError
 from pamrs.findings import (
     BlockVerdict,
     Condition,
@@ -27,8 +31,12 @@ from pamrs.report import text as words
 from tests.diagnosis import synthetic
 from tests.tables import rows_of
 
+MADE = pytest.mark.parametrize(
+    "make", [synthetic.diagnosis, synthetic.sealed_chamber, synthetic.nothing]
+)
 
-@pytest.mark.parametrize("make", [synthetic.diagnosis, synthetic.sealed_chamber, synthetic.nothing])
+
+@MADE
 def test_json_follows_schema(make, tmp_path: Path) -> None:
     jsonschema.Draft202012Validator.check_schema(schema())
     path = tmp_path / "out.json"
@@ -203,3 +211,57 @@ def test_format_uncertain() -> None:
     assert words.format_uncertain(41.27, 2.2) == "41.3 ± 2.2"
     assert words.format_uncertain(2.0, None) == "2.000"
     assert words.format_probability(0.9999) == "> 0.99"
+
+
+@MADE
+def test_what_was_written_is_read(make, tmp_path: Path) -> None:
+    made = make()
+    written = made.to_json(tmp_path / "result.json")
+    read = pamrs.load_result(tmp_path)
+    assert isinstance(read, pamrs.Diagnosis)
+    assert read.to_json() == written
+    assert read == pamrs.load_result(tmp_path / "result.json") == made
+    assert (read.case, read.text, repr(read)) == (made.case, made.text, repr(made))
+    assert read.summary() == made.summary()
+    assert made._repr_html_().startswith(read._repr_html_())  # behind it, a picture
+    assert [type(one) for one in read.effects] == [type(one) for one in made.effects]
+    assert [one.name for one in read.effects] == [one.name for one in made.effects]
+
+
+def test_what_a_file_does_not_keep_says_what_to_do(tmp_path: Path) -> None:
+    synthetic.diagnosis().to_json(tmp_path / "result.json")
+    read = pamrs.load_result(tmp_path)
+    with pytest.raises(DiagnosisError, match="rig is not kept .* --model wrote"):
+        _ = read.rig
+    with pytest.raises(DiagnosisError, match="run pamrs.diagnose on the case again"):
+        read.report(tmp_path / "report.html")
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"schema": "pamrs.diagnosis/9"}, "'pamrs.diagnosis/9' is not allowed: pamrs.diagnosis/1"),
+        ({"verdict": "maybe"}, "verdict is 'maybe'"),
+        ({"effects": [{"probability": 0.5}]}, "is no complete result"),
+        ({"effects": 3}, "is no complete result"),
+        ({"where": [1]}, "is no complete result"),
+        ({"settings": {"speed": 1}}, "settings has 'speed'"),
+    ],
+)
+def test_what_is_no_result_is_named(change, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "result.json"
+    file.write_text(json.dumps(json.loads(synthetic.diagnosis().to_json()) | change))
+    with pytest.raises(DiagnosisError, match=said):
+        pamrs.load_result(file)
+
+
+def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DiagnosisError, match=r"result\.json: cannot be read"):
+        pamrs.load_result(tmp_path)
+    (tmp_path / "result.json").write_text("[1, 2")
+    with pytest.raises(DiagnosisError, match="is not the JSON of a result"):
+        pamrs.load_result(tmp_path)
+    (tmp_path / "result.json").write_text("[1, 2]")
+    with pytest.raises(DiagnosisError, match="schema = None"):
+        pamrs.load_result(tmp_path)

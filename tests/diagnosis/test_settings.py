@@ -38,13 +38,8 @@ def numbers(tree: ast.Module) -> dict[str, ast.stmt]:
 def without_reason(text: str) -> list[str]:
     """Numbers of a module with no comment behind, above or text below them."""
     tree, lines = ast.parse(text), text.splitlines()
-    texts = {
-        n.lineno
-        for n in tree.body
-        if isinstance(n, ast.Expr)
-        and isinstance(n.value, ast.Constant)
-        and isinstance(n.value.value, str)
-    }
+    alone = (n for n in tree.body if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant))
+    texts = {n.lineno for n in alone if isinstance(n.value.value, str)}
     return [
         name
         for name, own in numbers(tree).items()
@@ -69,11 +64,7 @@ def test_no_function_reads_a_default() -> None:
     makers = {"__init__.py", "result.py", *asked}
     for path in sorted(DIAGNOSIS.rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        calls = {
-            n.func.id
-            for n in ast.walk(tree)
-            if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
-        }
+        calls = {getattr(n.func, "id", "") for n in ast.walk(tree) if isinstance(n, ast.Call)}
         inside = path.relative_to(DIAGNOSIS).as_posix()
         assert "DiagnosisSettings" not in calls or inside in makers, inside
 
@@ -150,19 +141,11 @@ def test_a_setting_that_changes_changes_the_outcome_and_is_kept() -> None:
 def words(path: Path) -> list[tuple[int, str]]:
     """Every text in the code of a module, docstrings left out."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    docs = {
-        id(node.body[0].value)
-        for node in ast.walk(tree)
-        if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef))
-        and node.body
-        and isinstance(node.body[0], ast.Expr)
-    }
-    own = [
-        n
-        for n in ast.walk(tree)
-        if isinstance(n, ast.Constant) and isinstance(n.value, str) and id(n) not in docs
-    ]
-    return [(n.lineno, n.value) for n in own]
+    documented = (ast.Module, ast.FunctionDef, ast.ClassDef)
+    first = [n.body[0] for n in ast.walk(tree) if isinstance(n, documented) and n.body]
+    docs = {id(n.value) for n in first if isinstance(n, ast.Expr)}
+    own = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and id(n) not in docs]
+    return [(n.lineno, n.value) for n in own if isinstance(n.value, str)]
 
 
 @pytest.mark.parametrize("package", ["diagnosis", "report", "findings"])
