@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -175,10 +175,11 @@ def run(
         shape.sealed.tolist(),
     )
 
-    def steer(i: int, measured: Callable[[int], float]) -> float:
+    def steer(i: int, measured: Iterator[float]) -> float:
         if command is not None:
             return float(command[i])
-        return control(reference[i], measured(2), measured(0), dither[i], sealed[i])
+        p, _, angle = measured
+        return control(reference[i], angle, p, dither[i], sealed[i])
 
     path = CommandPath(plant, sample_time)
     y = start or plant.rest(supply + plant.par.ambient, RECORDING_PERIOD * index)
@@ -188,7 +189,7 @@ def run(
 
 def recorded(
     path: Any,
-    steer: Callable[[int, Callable[[int], float]], Any],
+    steer: Callable[[int, Iterator[float]], Any],
     n: int,
     y: State,
     noise: Noise,
@@ -198,8 +199,8 @@ def recorded(
 ) -> Record:
     """A recording of `n` samples of the plant of a path, from a state.
 
-    `steer` gives the command, or those of a pair, from the number of a sample and what each channel
-    measures, every `held` samples; the others as :func:`run`.
+    `steer` gives the command, or those of a pair, from the number of a sample and what the channels
+    measure, every `held` samples; the others as :func:`run`.
     """
     plant, sample_time = path.plant, path.sample_time
     spread = np.array([(noise.pressure, noise.angle)[k == 2] for k in path.kinds])
@@ -217,11 +218,8 @@ def recorded(
         reading = plant.reading(y, opening)
         clean.append(reading)
         if i % held == 0:
-
-            def measured(k: int, now: Any = reading, off: Any = noisy[i]) -> float:
-                return float(round((now[k] + off[k]) / steps[k]) * steps[k])
-
-            u = steer(i, measured)
+            measured = zip(reading, noisy[i], steps, strict=True)
+            u = steer(i, (round((v + e) / s) * s for v, e, s in measured))
         sent.append(u)
         for opening, span in path.spans(u, begin + i * sample_time):
             y, step = plant.advance(y, opening, span, step)

@@ -148,18 +148,18 @@ def test_a_wrong_parameter_is_the_verdict_parameters() -> None:
 
 
 def test_a_name_that_is_more_probable_than_not_is_given() -> None:
-    def of(**chances: float) -> Judged:
-        own = {name.replace("_and_", "+"): chance for name, chance in chances.items()}
-        (judged,) = judge([group("arm", own)], SETTINGS)
+    def of(chances: dict[str, float]) -> Judged:
+        (judged,) = judge([group("arm", chances)], SETTINGS)
         return judged
 
-    one = of(muscle_creep=0.35, muscle_creep_and_payload_swing=0.25, unlisted=0.4)
+    one = of({"muscle_creep": 0.35, "muscle_creep+payload_swing": 0.25, "unlisted": 0.4})
     assert (one.verdict, one.named) == ("effects", terms("muscle_creep"))
     both = ["muscle_creep", "payload_swing"]
     assert left_open(one.ambiguity) == [["unlisted"], ["muscle_creep"], both]
-    two = of(muscle_creep=0.45, muscle_hysteresis=0.4, unlisted=0.15)
+    two = of({"muscle_creep": 0.45, "muscle_hysteresis": 0.4, "unlisted": 0.15})
     assert (two.verdict, two.named) == ("effects", terms("muscle_creep"))
-    assert of(muscle_creep=0.35, muscle_hysteresis=0.25, unlisted=0.4).verdict == "unlisted"
+    none = of({"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})
+    assert none.verdict == "unlisted"
 
 
 def test_healthy_groups() -> None:

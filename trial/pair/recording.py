@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import accumulate
 
 import numpy as np
@@ -83,8 +83,8 @@ def run_pair(
     """One recording of a pair, from rest; arguments as those of :func:`trial.recording.run`."""
     y = plant.rest(supply + plant.par.ambient, RECORDING_PERIOD * index)
 
-    def steer(i: int, measured: Callable[[int], float]) -> Commands:
-        return steering(i, tuple(map(measured, range(len(KINDS)))))
+    def steer(i: int, measured: Iterator[float]) -> Commands:
+        return steering(i, tuple(measured))
 
     path = PairPath(plant, sample_time)
     return recorded(path, steer, len(course.reference), y, noise, rng, index, held)
