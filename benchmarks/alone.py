@@ -99,20 +99,11 @@ def diagnosis() -> None:
         "names = [e['id'] for e in found.effects]; print(json.dumps([seconds, "
         "resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, found.verdict, names]))"
     )
-    for number, kind in enumerate(
-        ("leak_muscle", "leak_muscle+muscle_hysteresis", "hose_torque"), 1
-    ):
+    kinds = ("leak_muscle", "leak_muscle+muscle_hysteresis", "hose_torque")
+    for number, kind in enumerate(kinds, 1):
         with tempfile.TemporaryDirectory() as folder:
-            made = [
-                "--out",
-                f"{folder}/cases",
-                "--keys-dir",
-                f"{folder}/keys",
-                "--kind",
-                kind,
-                "--seed",
-                str(6 + number),
-            ]
+            made = ["--out", f"{folder}/cases", "--keys-dir", f"{folder}/keys"]
+            made += ["--kind", kind, "--seed", str(6 + number)]
             subprocess.run(
                 [sys.executable, "-m", "trial", "make", *made],
                 cwd=ROOT,

@@ -206,17 +206,10 @@ def hard() -> dict[str, list[Run]]:
         "hanging_mass, lengthens through its rest length": (0.998, 0.25, 6e4),
         "hanging_mass, shortens through its rest length": (1.006, -0.2, 2e5),
     }
-    found = {
-        name: [
-            steady(
-                "hanging_mass",
-                21,
-                {"length": share * length, "length_rate": rate, "muscle_pressure": pressure},
-                valve=5.0,
-            )
-        ]
-        for name, (share, rate, pressure) in through.items()
-    }
+    found = {}
+    for name, (share, rate, pressure) in through.items():
+        start = {"length": share * length, "length_rate": rate, "muscle_pressure": pressure}
+        found[name] = [steady("hanging_mass", 21, start, valve=5.0)]
     rng = np.random.default_rng(1)
     return found | {"two_joint_arm, driven hard": [driven(rng) for _ in range(30)]}
 

@@ -15,8 +15,6 @@ from . import peers
 from .race import Ratio, Times, race, ratio
 from .workload import BATCH, SAMPLES, Batches, Shoulder, apart
 
-__all__ = ["ALLOWED", "Goal", "Step", "goals", "one_step", "table_and_solve"]
-
 #: How far a peer's last angle may be from ours [deg]: farther, and its time says nothing.
 ALLOWED = 1e-3
 RUN = f"{(SAMPLES - 1) * peers.SAMPLE_TIME:g} s"

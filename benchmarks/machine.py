@@ -9,8 +9,6 @@ import re
 import subprocess
 from pathlib import Path
 
-__all__ = ["commit", "describe", "versions"]
-
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "jax", "jaxlib", "diffrax")
 
 

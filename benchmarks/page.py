@@ -11,8 +11,6 @@ from .race import Ratio
 from .scaling import LEAST_SAMPLES, PEERS_UP_TO, Point
 from .workload import BATCH
 
-__all__ = ["Results", "page"]
-
 
 @dataclass(frozen=True)
 class Results:

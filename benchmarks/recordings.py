@@ -181,17 +181,11 @@ def cylinder_rows(folder: Path) -> list[tuple[str, ...]]:
         (f0, s0), (f1, s1) = told["params"]["f0"], told["params"]["f1"]
         values = f"{f0:.2f} ± {s0:.2f} N; {1e5 * f1:.2f} ± {1e5 * s1:.2f} N/bar"
         sizes = [told[n] for n in ("noise", "before", "constant", "after")]
-        found.append(
-            (
-                name,
-                f"depends on pressure {laws.pressure:.2f} ({laws.range[0]:.2f} to "
-                f"{laws.range[1]:.2f}): {word}",
-                budget,
-                values,
-                " / ".join(f"{v:.2f}" for v in sizes) + " N",
-                f"{time.perf_counter() - began:.0f}",
-            )
-        )
+        low, high = laws.range
+        law = f"depends on pressure {laws.pressure:.2f} ({low:.2f} to {high:.2f}): {word}"
+        errors = " / ".join(f"{v:.2f}" for v in sizes) + " N"
+        spent = f"{time.perf_counter() - began:.0f}"
+        found.append((name, law, budget, values, errors, spent))
     return found
 
 

@@ -67,19 +67,12 @@ def swept(store: Path, runs: int, chunk: int, executor: Executor | None = None) 
     """Seconds of a sweep on one thread."""
     rig = pamrs.rigs.shoulder()
 
+    how = {"executor": executor, "chunk": chunk, "threads": 1, "progress": False}
+
     def work() -> None:
-        pamrs.sweep(
-            rig,
-            sweeps.samples(rig, PARAMETERS, runs),
-            METRICS,
-            sample_time=0.005,
-            valve_command=COMMAND,
-            store=store,
-            executor=executor,
-            chunk=chunk,
-            threads=1,
-            progress=False,
-        )
+        drawn = sweeps.samples(rig, PARAMETERS, runs)
+        given = {"sample_time": 0.005, "valve_command": COMMAND, "store": store}
+        pamrs.sweep(rig, drawn, METRICS, **given, **how)
 
     return timed(work)
 

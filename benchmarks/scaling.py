@@ -11,8 +11,6 @@ import numpy as np
 from .race import race
 from .workload import BATCH, SAMPLES, Batches
 
-__all__ = ["Point", "over_size", "over_threads"]
-
 #: Plants times samples that one call may have: larger batches run for a shorter time.
 MOST = 4_000_000
 LEAST_SAMPLES = 5

@@ -14,8 +14,6 @@ import pamrs
 
 from . import peers
 
-__all__ = ["BATCH", "KEPT", "SAMPLES", "Batches", "Shoulder", "apart"]
-
 Array = NDArray[np.float64]
 SAMPLES = 401  # 2 s
 BATCH = 512

@@ -37,8 +37,6 @@ from reproduction.stand_in import (
 from reproduction.statement_tables import Told
 from reproduction.statements import Statements
 
-__all__ = ["chosen", "ends", "facts", "headings", "in_short", "over", "sample", "say"]
-
 #: The statements of the chapter.
 say: Final = Statements("chapter2")
 

@@ -19,8 +19,6 @@ from reproduction.chapter2 import ends, sample, say
 from reproduction.page import Picture
 from reproduction.stand_in import EXTENSION, LEVELS, ORDERS, PSI, THREE, Fits, stand_in
 
-__all__ = ["pictures"]
-
 Array = NDArray[np.float64]
 
 _MM: Final = 1e3
@@ -96,13 +94,8 @@ def _blocked() -> Figure:
         ):
             muscle = own.replace(model=model, braid_angle=np.radians(degrees))
             cell.plot(pressure / 1e6, muscle.force(pressure, 0.0) / 1e3, color=colour, label=label)
-        cell.plot(
-            pressure / 1e6,
-            measured / 1e3,
-            color="#1f1f1f",
-            ls=":",
-            label="(2.16) at 76.5 deg",
-        )
+        words = "(2.16) at 76.5 deg"
+        cell.plot(pressure / 1e6, measured / 1e3, color="#1f1f1f", ls=":", label=words)
         cell.set(title=f"braid of {degrees:g} deg", xlabel="pressure [MPa]")
     cells[0].set_ylabel("blocked force [kN]")
     cells[0].legend(fontsize=7.5, frameon=False)
@@ -116,23 +109,21 @@ def _levels(cell: Axes, fit: MuscleFit, colours: dict[float, str] | str) -> None
         pressure = psi * PSI
         e = own.contractions(pressure)
         cell.plot(100.0 * e, own.force(pressure, e) / 1e3, **_DOTS)
-        near = np.linspace(max(e[0], fit.muscle_at(pressure).contraction_limits[0]), e[-1], 200)
-        cell.plot(
-            100.0 * near,
-            fit.muscle_at(pressure).force(pressure, near) / 1e3,
-            color=colours if isinstance(colours, str) else colours[psi],
-            lw=1.0,
-        )
+        fitted = fit.muscle_at(pressure)
+        near = np.linspace(max(e[0], fitted.contraction_limits[0]), e[-1], 200)
+        colour = colours if isinstance(colours, str) else colours[psi]
+        cell.plot(100.0 * near, fitted.force(pressure, near) / 1e3, color=colour, lw=1.0)
     cell.set_xlabel("contraction [%]")
 
 
 def _free() -> Figure:
     figure, cells = drawing.axes(1, 2, 3.8, sharey=True)
     found = sample()[_SHOWN]
-    for cell, name, title, colour in (
-        (cells[0], "constant", "constant thickness, cylinder", COLOURS["before"]),
-        (cells[1], "elliptic", "non-constant thickness, elliptic ends", COLOURS["after"]),
-    ):
+    shown = (
+        ("constant", "constant thickness, cylinder", COLOURS["before"]),
+        ("elliptic", "non-constant thickness, elliptic ends", COLOURS["after"]),
+    )
+    for cell, (name, title, colour) in zip(cells, shown, strict=True):
         _levels(cell, found.free[name], colour)
         cell.set_title(title)
     cells[0].set_ylabel("force [kN]")
@@ -186,9 +177,8 @@ def _bands(cell: Axes, sets: list[tuple[str, str, Array]]) -> None:
         at = places + 0.16 * (k - 0.5 * (len(sets) - 1))
         middle = np.median(values, axis=0)
         reach = np.abs(np.array([values.min(axis=0), values.max(axis=0)]) - middle)
-        cell.errorbar(
-            at, 100.0 * middle, yerr=100.0 * reach, fmt="o", ms=4, lw=1.0, color=colour, label=label
-        )
+        dots: dict[str, Any] = {"fmt": "o", "ms": 4, "lw": 1.0, "color": colour}
+        cell.errorbar(at, 100.0 * middle, yerr=100.0 * reach, label=label, **dots)
     cell.set_xticks(places, [f"{psi:g}" for psi in LEVELS])
     cell.set(xlabel="pressure [psi]", ylabel="error (2.37) [%]")
     cell.set_ylim(bottom=0.0)
@@ -198,13 +188,11 @@ def _bands(cell: Axes, sets: list[tuple[str, str, Array]]) -> None:
 def _errors() -> Figure:
     figure, (cell,) = drawing.axes(1, 1, 3.2)
     every = sample()
-    _bands(
-        cell,
-        [
-            (f"order {m}", colour, np.array([f.error(f.linear[m]) for f in every]))
-            for m, colour in zip(ORDERS, _ORDER_COLOUR, strict=True)
-        ],
-    )
+    sets = [
+        (f"order {m}", colour, np.array([f.error(f.linear[m]) for f in every]))
+        for m, colour in zip(ORDERS, _ORDER_COLOUR, strict=True)
+    ]
+    _bands(cell, sets)
     return figure
 
 
@@ -247,13 +235,10 @@ def _three() -> Figure:
 def _three_errors() -> Figure:
     figure, (cell,) = drawing.axes(1, 1, 3.0)
     every: list[Fits] = sample()
-    _bands(
-        cell,
-        [
-            ("all eight", COLOURS["after"], np.array([f.error(f.linear[4]) for f in every])),
-            ("20, 60, 120 psi", COLOURS["before"], np.array([f.error(f.three) for f in every])),
-        ],
-    )
+    eight = np.array([f.error(f.linear[4]) for f in every])
+    three = np.array([f.error(f.three) for f in every])
+    after, before = COLOURS["after"], COLOURS["before"]
+    _bands(cell, [("all eight", after, eight), ("20, 60, 120 psi", before, three)])
     return figure
 
 
@@ -268,11 +253,7 @@ def _loops() -> Figure:
         cell.plot(100.0 * e, loops.force[rows] / 1e3, color="#9ca3af", lw=2.0)
         mean = fit.muscle_at(pressure).force(pressure, e)
         share = max(0.16 - 0.145 * pressure / 1e6, 0.01)
-        cell.plot(
-            100.0 * e,
-            (mean + loops.direction[rows] * share * np.abs(mean)) / 1e3,
-            color=COLOURS["after"],
-            lw=0.9,
-        )
+        force = (mean + loops.direction[rows] * share * np.abs(mean)) / 1e3
+        cell.plot(100.0 * e, force, color=COLOURS["after"], lw=0.9)
     cell.set(xlabel="contraction [%]", ylabel="force [kN]")
     return figure

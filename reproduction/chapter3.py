@@ -31,8 +31,6 @@ from reproduction.elbow import FOOT_POUND, INCH, POUND, PSI
 from reproduction.statement_tables import Told
 from reproduction.statements import TRIAL, Lines, Statements
 
-__all__ = ["chosen", "facts", "headings", "in_short", "say", "step_by_area"]
-
 #: The statements of the chapter.
 say: Final = Statements("chapter3")
 

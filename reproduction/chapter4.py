@@ -30,10 +30,6 @@ from reproduction.margins import loop_margin
 from reproduction.statement_tables import Told
 from reproduction.statements import OTHER, OWN, TRIAL, Lines
 
-__all__ = ["DAMPED", "PRINTED", "RUBBING", "SMOOTH", "agreed", "experiments", "facts", "in_short"]
-__all__ += ["latest", "say", "tables"]
-
-
 #: Names of the plants, see :data:`reproduction.lift.VARIANTS`: the one of the score, the
 #: library's muscle with hysteresis and without, and that with damping.
 PRINTED: Final = "as printed"
@@ -229,28 +225,19 @@ def _rig_alone() -> list[Comparison]:
 
 def _lines(done: Experiments) -> list[Comparison]:
     """4.5.1.2: kD and g2, each varied last."""
-    kd, g2 = (
-        [pair[0] for pair in done.lines[name].best(done.lines[name].j["rad"])]
-        for name in ("kD", "g2")
-    )
-    kp = [pair[0] for pair in done.maps[PRINTED, "pid"].best(done.maps[PRINTED, "pid"].j["rad"])]
-    by_payload = " ({}), ".join(("{:g}",) * 3) + " ({})"
+
+    def best(own: Map) -> list[float]:
+        return [pair[0] for pair in own.best(own.j["rad"])]
+
+    def by_payload(gains: list[float]) -> str:
+        return ", ".join(f"{gain:g} ({kg})" for gain, kg in zip(gains, _KG, strict=True))
+
+    pid = done.maps[PRINTED, "pid"]
+    kd, g2, kp = (best(own) for own in (done.lines["kD"], done.lines["g2"], pid))
+    low, high, border, near = min(kp), max(kp), _border(pid, 0, 1, 2), _DERIVATIVE[1]
     return [
-        say(
-            "PID_largest_kd",
-            max(kd),
-            by_payload.format(*(x for pair in zip(kd, _KG, strict=True) for x in pair)),
-            min(kp),
-            max(kp),
-            _border(done.maps[PRINTED, "pid"], 0, 1, 2),
-            tolerance=_DERIVATIVE[1],
-        ),
-        say(
-            "fuzzy_largest_g2",
-            max(g2) / min(g2),
-            by_payload.format(*(x for pair in zip(g2, _KG, strict=True) for x in pair)),
-            _at_an_end(g2),
-        ),
+        say("PID_largest_kd", max(kd), by_payload(kd), low, high, border, tolerance=near),
+        say("fuzzy_largest_g2", max(g2) / min(g2), by_payload(g2), _at_an_end(g2)),
     ]
 
 
@@ -485,18 +472,11 @@ def _diagnoses(done: Experiments) -> list[Comparison]:
             )
             for effect in found.effects
         )
-        rows += [
-            say(
-                "probability",
-                probability.get(effect, 0.0),
-                name,
-                effect,
-                found.verdict,
-                named or "nothing named",
-                ", ".join((f"{key} {value:g}" for key, value in values.items())),
-            )
-            for effect, values in hidden.items()
-        ]
+        for effect, values in hidden.items():
+            sizes = ", ".join(f"{key} {value:g}" for key, value in values.items())
+            chance, verdict = probability.get(effect, 0.0), found.verdict
+            said = named or "nothing named"
+            rows.append(say("probability", chance, name, effect, verdict, said, sizes))
     return rows
 
 

@@ -15,16 +15,17 @@ from matplotlib.figure import Figure
 
 from pamrs.report.figures import COLOURS
 from reproduction import drawing, lift
-from reproduction.chapter4 import PRINTED, RUBBING, SMOOTH, agreed, latest, say
-from reproduction.chapter4_statements import SERIES, statements
+from reproduction.chapter4 import PRINTED, RUBBING, SMOOTH, agreed, latest
+from reproduction.chapter4_statements import SERIES, say, statements
 from reproduction.lift import Lifts
 from reproduction.page import Picture
-
-__all__ = ["pictures"]
 
 _PAYLOAD: Final = ("#56b4e9", "#0072b2", "#d55e00", "#1f1f1f")
 _NAMES: Final = ("11 kg", "23 kg", "34 kg", "45 kg")
 _REFERENCE: Final[dict[str, Any]] = {"color": "#9ca3af", "lw": 2.4, "zorder": 0}
+_ABOVE: Final[dict[str, Any]] = {
+    "loc": "outside upper center", "fontsize": 7.5, "frameon": False,
+}  # fmt: skip
 _SHORT: Final = {
     PRINTED: "as printed, (4.4)-(4.7)",
     RUBBING: "hysteresis (2.36)",
@@ -67,14 +68,9 @@ def _lifts(plant: str, controllers: tuple[str, str]) -> Figure:
         _reference(upper, runs[name])
         payloads = _PAYLOAD if lift.GAINS[name][0] else _PAYLOAD[:3]
         for k, colour in enumerate(payloads):
-            upper.plot(
-                runs[name].time,
-                np.degrees(runs[name].angle[k]),
-                color=colour,
-                lw=1.0,
-                label=_NAMES[k],
-            )
-            lower.plot(runs[name].time, runs[name].pressure[k] / 1e3, color=colour, lw=1.0)
+            run, thin = runs[name], {"color": colour, "lw": 1.0}
+            upper.plot(run.time, np.degrees(run.angle[k]), label=_NAMES[k], **thin)
+            lower.plot(run.time, run.pressure[k] / 1e3, **thin)
         gains = lift.GAINS[name]
         letters = ("kM", "kP", "kI") if len(gains) == 3 else ("kM", "g1", "g2", "h")
         told = ", ".join(f"{a} {b:g}" for a, b in zip(letters, gains, strict=True))
@@ -82,13 +78,7 @@ def _lifts(plant: str, controllers: tuple[str, str]) -> Figure:
         lower.set_xlabel("time [s]")
     axes[0][0].set_ylabel("angle [deg]")
     axes[1][0].set_ylabel("pressure [kPa]")
-    figure.legend(
-        *axes[0][1].get_legend_handles_labels(),
-        loc="outside upper center",
-        ncols=5,
-        fontsize=7.5,
-        frameon=False,
-    )
+    figure.legend(*axes[0][1].get_legend_handles_labels(), ncols=5, **_ABOVE)
     axes[0][0].set_ylim(0.0, 135.0)
     return figure
 
@@ -100,14 +90,10 @@ def _series() -> Figure:
         runs = latest().lifts[plant]
         _reference(cell, runs["series, kM 0"])
         for (km, name), colour in zip(SERIES.items(), _PAYLOAD, strict=True):
-            rms = float(np.degrees(np.asarray(runs[name].metrics.rms)[1]))
-            cell.plot(
-                runs[name].time,
-                np.degrees(runs[name].angle[1]),
-                color=colour,
-                lw=1.0,
-                label=f"kM {km:g}: {rms:.1f} deg RMS",
-            )
+            run = runs[name]
+            rms = float(np.degrees(np.asarray(run.metrics.rms)[1]))
+            words = f"kM {km:g}: {rms:.1f} deg RMS"
+            cell.plot(run.time, np.degrees(run.angle[1]), color=colour, lw=1.0, label=words)
         cell.set(title=_SHORT[plant], xlabel="time [s]")
         cell.set_ylim(0.0, 185.0)
         cell.set_yticks(range(0, 121, 20))
@@ -131,14 +117,8 @@ def _maps(plant: str) -> Figure:
         )
         for cell, (name, values) in zip(axes[line], shown, strict=True):
             share = np.minimum(values[1] / np.nanmin(values[1]), 10.0)
-            field = cell.contourf(
-                x,
-                y,
-                share.T,
-                levels=np.geomspace(1.0, 10.0, 13),
-                cmap="viridis_r",
-                norm=LogNorm(1.0, 10.0),
-            )
+            levels, norm = np.geomspace(1.0, 10.0, 13), LogNorm(1.0, 10.0)
+            field = cell.contourf(x, y, share.T, levels=levels, cmap="viridis_r", norm=norm)
             best = gains.best(values)[1]
             cell.plot(*best, "o", color="white", mec="#1f1f1f", ms=6, clip_on=False)
             cell.plot(*published, "x", color="#d55e00", ms=7, mew=2)
@@ -160,36 +140,20 @@ def _optima() -> Figure:
         "g1": ((23, 0.45),),
         "h": ((23, 0.65),),
     }
-    cells = zip(
-        axes[0],
-        (("pid", 0, "kP"), ("pid", 1, "kI"), ("fuzzy", 0, "g1"), ("fuzzy", 1, "h")),
-        strict=True,
-    )
-    for cell, (kind, which, label) in cells:
+    gains = (("pid", 0, "kP"), ("pid", 1, "kI"), ("fuzzy", 0, "g1"), ("fuzzy", 1, "h"))
+    for cell, (kind, which, label) in zip(axes[0], gains, strict=True):
         for plant, colour in ((PRINTED, COLOURS["after"]), (RUBBING, COLOURS["before"])):
             for unit, style in (("rad", "-o"), ("deg", ":s")):
-                best = done.maps[plant, kind].best(done.maps[plant, kind].j[unit])
-                cell.plot(
-                    kilograms,
-                    [pair[which] for pair in best],
-                    style,
-                    color=colour,
-                    ms=4,
-                    label=f"{_SHORT[plant]}, {unit}",
-                )
-        cell.plot(
-            *zip(*printed[label], strict=True),
-            "D",
-            color="#9ca3af",
-            ms=7,
-            zorder=0,
-            label="printed",
-        )
+                own = done.maps[plant, kind]
+                best = [pair[which] for pair in own.best(own.j[unit])]
+                words = f"{_SHORT[plant]}, {unit}"
+                cell.plot(kilograms, best, style, color=colour, ms=4, label=words)
+        marks = zip(*printed[label], strict=True)
+        cell.plot(*marks, "D", color="#9ca3af", ms=7, zorder=0, label="printed")
         cell.set(title=label, xlabel="payload [kg]")
         cell.margins(y=0.15)
         cell.set_ylim(bottom=0.0)
-    handles, labels = axes[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3, fontsize=7.5, frameon=False)
+    figure.legend(*axes[0][0].get_legend_handles_labels(), ncols=3, **_ABOVE)
     return figure
 
 

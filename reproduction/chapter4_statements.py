@@ -15,8 +15,6 @@ from reproduction.elbow import PSI
 from reproduction.lift import Lifts
 from reproduction.statements import Statements
 
-__all__ = ["SERIES", "on_stop", "restless", "say", "statements"]
-
 #: The statements of the chapter.
 say: Final = Statements("chapter4")
 
@@ -128,22 +126,11 @@ def _simulated(runs: Mapping[str, Lifts]) -> list[Row]:
     rows: list[Row] = []
     for name, figure in (("FF+fuzzy", "Fig. 4.6"), ("FF+PID", "Fig. 4.7")):
         run, where = runs[name], f"4.4.2, {figure}"
+        above, swing, lift = run.overshoot, run.swing, run.error("lift")
         rows += [
-            (
-                "largest_overshoot_hold",
-                float(run.overshoot.max()),
-                name,
-                where,
-                _list(run.overshoot),
-            ),
-            ("swing_last_2", float(run.swing.max()), name, where, _list(run.swing)),
-            (
-                "error_lift_45",
-                float(run.error("lift")[3] / run.error("lift")[0]),
-                name,
-                where,
-                _list(run.error("lift")),
-            ),
+            ("largest_overshoot_hold", float(above.max()), name, where, _list(above)),
+            ("swing_last_2", float(swing.max()), name, where, _list(swing)),
+            ("error_lift_45", float(lift[3] / lift[0]), name, where, _list(lift)),
         ]
     pid, fuzzy = runs["FF+PID"].error("return"), runs["FF+fuzzy"].error("return")
     rows.append(("error_return_FF", float(np.mean(pid) / np.mean(fuzzy)), _list(pid)))

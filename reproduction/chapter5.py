@@ -25,8 +25,6 @@ from reproduction.statements import Lines
 from reproduction.tracking import KINDS, PAYLOADS, SETTLED, Track
 from reproduction.tracking_runs import FULL, MIDDLE, STARTS, TRIALS, WRONG, Plan
 
-__all__ = ["chosen", "facts", "in_short", "say", "share_by_angle", "tables"]
-
 #: Mean squared error at the top of the axis of Fig. 5.8(c), as an rms [deg].
 _AXIS: Final = math.sqrt(400.0)
 #: Pressure at which Gaylord's force is compared [Pa].

@@ -16,8 +16,6 @@ from reproduction.chapter5_statements import say
 from reproduction.tracking import KINDS, SETTLED, Track
 from reproduction.tracking_runs import MIDDLE, Plan
 
-__all__ = ["compound", "effects", "hysteresis", "lift", "orders"]
-
 Array = NDArray[np.float64]
 
 

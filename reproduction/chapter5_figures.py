@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
@@ -18,8 +18,6 @@ from reproduction.chapter5_statements import say
 from reproduction.page import Picture
 from reproduction.tracking import KINDS, PAYLOADS, Track
 from reproduction.tracking_runs import FULL, LATER, MIDDLE, STARTS, TRIALS, WRONG, Plan
-
-__all__ = ["pictures"]
 
 _INK: Final = "#1f1f1f"
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d1f")
@@ -49,13 +47,8 @@ def _angles(axes: Axes, curves: Sequence[Curve]) -> None:
     run = curves[0][0]
     for track, row, _, colour in curves:
         axes.plot(*decimate(track.time, np.degrees(track.angle[row])), color=colour, lw=1.2)
-    axes.plot(
-        *decimate(run.time, np.degrees(run.wanted)),
-        color=_INK,
-        lw=0.9,
-        ls=(0, (4, 2)),
-        label="desired",
-    )
+    wanted = decimate(run.time, np.degrees(run.wanted))
+    axes.plot(*wanted, color=_INK, lw=0.9, ls=(0, (4, 2)), label="desired")
     axes.set(ylabel="angle [deg]", ylim=(0.0, 140.0))
     axes.legend(loc="upper right", fontsize=8)
 
@@ -67,12 +60,10 @@ def _errors(axes: Axes, curves: Sequence[Curve], limit: float) -> None:
     axes.legend(loc="upper right", ncols=min(4, len(curves)), fontsize=8)
 
 
-def _squares(axes: Axes, curves: Sequence[Curve], *, log: bool = True) -> None:
+def _squares(axes: Axes, curves: Sequence[Curve]) -> None:
     for track, row, words, colour in curves:
         axes.plot(*decimate(track.time, track.cumulative()[row]), color=colour, lw=1.3, label=words)
-    axes.set(ylabel="mean squared error\nso far [deg²]", xlabel="time [s]")
-    if log:
-        axes.set_yscale("log")
+    axes.set(ylabel="mean squared error\nso far [deg²]", xlabel="time [s]", yscale="log")
 
 
 def _three(curves: Sequence[Curve], limit: float) -> Figure:
@@ -91,33 +82,18 @@ def _sliding(plan: Plan) -> Figure:
     figure, (angle, error, square) = drawing.figure(3, 1, 6.4, sharex=True)
     _angles(angle, free)
     _errors(error, free, 40.0)
-    for p, (payload, style) in enumerate(
-        zip(PAYLOADS, ("-", (0, (4, 2)), (0, (1, 1.5))), strict=True)
-    ):
+    styles = ("-", (0, (4, 2)), (0, (1, 1.5)))
+    for p, (payload, style) in enumerate(zip(PAYLOADS, styles, strict=True)):
         for k in range(len(WRONG)):
-            square.plot(
-                *decimate(run.time, run.cumulative()[p * len(WRONG) + k]),
-                color=_COLOURS[k],
-                lw=1.3,
-                ls=style,
-            )
+            shown = decimate(run.time, run.cumulative()[p * len(WRONG) + k])
+            square.plot(*shown, color=_COLOURS[k], lw=1.3, ls=style)
         square.plot([], [], color=_INK, ls=style, label=f"{payload:g} lb")
     square.axhline(400.0, color=_INK, lw=0.7)
-    square.annotate(
-        ("top of the axis of Fig. 5.8(c)"),
-        (0.01, 400.0),
-        (0, 3),
-        xycoords=(("axes fraction"), ("data")),
-        textcoords="offset points",
-        fontsize=8,
-    )
-    square.set(
-        ylabel="mean squared error\nso far [deg²]",
-        xlabel="time [s]",
-        yscale="log",
-        xlim=(0.0, float(run.time[-1])),
-    )
-    square.set_ylim(5.0, 4e4)
+    top, place = "top of the axis of Fig. 5.8(c)", ("axes fraction", "data")
+    points: dict[str, Any] = {"xycoords": place, "textcoords": "offset points", "fontsize": 8}
+    square.annotate(top, (0.01, 400.0), (0, 3), **points)
+    _squares(square, ())
+    square.set(xlim=(0.0, float(run.time[-1])), ylim=(5.0, 4e4))
     square.legend(loc="upper right", ncols=3, fontsize=8)
     return figure
 
@@ -166,29 +142,20 @@ def _networks(plan: Plan) -> Figure:
     zero, later = plan.learning(), plan.prepared()
     figure, grid = drawing.figure(3, 3, 6.0, sharex=True, sharey="row")
     low, high = np.degrees(tracking.arm_model([0.0]).angle_range)
-    for column, (track, row, words) in enumerate(
-        (
-            (zero, _row(50.0), "from zero"),
-            (later, 0, "from the model"),
-            (later, 1, f"after {LATER[1][0]}"),
-        )
-    ):
-        for axes, (name, label) in zip(
-            grid[:, column],
-            {"H": "H [kPa s²/rad]", "C": "C [kPa s/rad]", "G": "G [kPa]"}.items(),
-            strict=True,
-        ):
+    labels = {"H": "H [kPa s²/rad]", "C": "C [kPa s/rad]", "G": "G [kPa]"}
+    shown = (
+        (zero, _row(50.0), "from zero"),
+        (later, 0, "from the model"),
+        (later, 1, f"after {LATER[1][0]}"),
+    )
+    for column, (track, row, words) in enumerate(shown):
+        for axes, (name, label) in zip(grid[:, column], labels.items(), strict=True):
             notes = track.noted[name]
             for k, weights in enumerate(notes):
                 values = 1e-3 * np.asarray(weights)[row]
                 shade = mpl.colormaps["Blues"](0.25 + 0.75 * k / max(1, len(notes) - 1))
-                axes.plot(
-                    np.linspace(low, high, values.size),
-                    values,
-                    color=shade,
-                    lw=1.3,
-                    label=f"{track.noted_at[k]:g} s",
-                )
+                at, when = np.linspace(low, high, values.size), f"{track.noted_at[k]:g} s"
+                axes.plot(at, values, color=shade, lw=1.3, label=when)
             if column == 0:
                 axes.set(ylabel=label)
         grid[0, column].set_title(words, fontsize=9)
@@ -207,13 +174,8 @@ def _training(plan: Plan) -> Figure:
         for k, (payload, effect) in enumerate(plan.cases):
             if effect in ("", "muscle_hysteresis"):
                 words = f"{payload:g} lb" + (", hysteresis" if effect else "")
-                one.plot(
-                    0.5 * (edges[1:] + edges[:-1]),
-                    values[:, k],
-                    color=_COLOURS[min(k, 3)],
-                    lw=1.2,
-                    label=words,
-                )
+                middle, colour = 0.5 * (edges[1:] + edges[:-1]), _COLOURS[min(k, 3)]
+                one.plot(middle, values[:, k], color=colour, lw=1.2, label=words)
         one.set(title=kind, xlabel="time [s]", yscale="log")
     axes[0].set(ylabel="rms error [deg]")
     axes[1].legend(loc="upper right", fontsize=8)
@@ -254,10 +216,9 @@ def _hysteresis(plan: Plan) -> Figure:
     ):
         run = plan.compensated(known)
         part = run.time >= tracking.SETTLED
-        over_time.plot(
-            *decimate(run.time[part], run.error[0][part]), color=colour, lw=1.0, label=words
-        )
-        over_angle.plot(np.degrees(run.angle[0][part]), run.error[0][part], color=colour, lw=0.6)
+        error = run.error[0][part]
+        over_time.plot(*decimate(run.time[part], error), color=colour, lw=1.0, label=words)
+        over_angle.plot(np.degrees(run.angle[0][part]), error, color=colour, lw=0.6)
     over_time.set(xlabel="time [s]", ylabel="error [deg]")
     over_angle.set(xlabel="angle [deg]")
     over_time.legend(loc="lower right", fontsize=8)

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from reproduction.statements import Statements
 
-__all__ = ["listed", "say"]
-
 say: Final = Statements("chapter5")
 
 

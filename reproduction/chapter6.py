@@ -32,8 +32,6 @@ from reproduction.rigs import with_struts
 from reproduction.statement_tables import Told
 from reproduction.statements import OTHER, Statements
 
-__all__ = ["experiments", "facts", "headings", "in_short", "latest", "say", "tables"]
-
 #: The statements of the chapter.
 say: Final = Statements("chapter6")
 
@@ -179,19 +177,13 @@ def _pair() -> list[Comparison]:
         float(_loss(muscle, p, np.linspace(0.02, end, 100)).min())
         for p, end in zip(levels, free, strict=True)
     ]
+    gap = min(a - b for a, b in zip(full, free, strict=True))
     low, high = (float(_loss(muscle, p, 0.10)) for p in levels)
     ambient = 101325.0
     air = [2.0 * (p + ambient) / (2.0 * p + ambient) for p in levels]
     return [
         say("one_two_blocked", 100.0 * min(least), 100 * low, 100 * high),
-        say(
-            "free_contraction_one",
-            min((a - b for a, b in zip(full, free, strict=True))),
-            full[0],
-            free[0],
-            full[1],
-            free[1],
-        ),
+        say("free_contraction_one", gap, full[0], free[0], full[1], free[1]),
         say("share_lost_rubber", low / high),
         say("air_two_muscles", air[1], air[0]),
     ]
@@ -234,19 +226,13 @@ def _shape_of_joint() -> list[Comparison]:
         np.asarray(joint.torque(one, 13.0 * BAR, angles, count=6))
         for one in (muscle, muscle.replace(model="gaylord", geometry="elliptic"))
     )
+    low, middle, high = torque
     most = float(joint.shortening(angles[-1])) / muscle.parameters["rest_length"]
     bent, free = (
         200.0 * float(muscle.radius(e)) for e in (most, free_contraction(muscle, 13.0 * BAR))
     )
     return [
-        say(
-            "torque_constant",
-            torque[2] / torque[0],
-            braid[2] / braid[0],
-            torque[0],
-            torque[1],
-            torque[2],
-        ),
+        say("torque_constant", high / low, braid[2] / braid[0], low, middle, high),
         say("room", bent, 100.0 * most, free),
     ]
 
@@ -296,6 +282,7 @@ def _cycles(done: Experiments) -> list[Comparison]:
     over = max(float(np.degrees(c.angle.max()) - c.high) for c in (done.flat, done.steep))
     assert done.plain is not None
     slow = done.plain.efficiency / _of(done.readings["as it is"][0], MATRIX[90.0])
+    farthest = float(slow[np.argmax(np.abs(np.log(slow)))])
     short = 90.0 - done.plain.tops()
     payload, number, lightest = zip(_trends(done.flat), _trends(done.steep), strict=True)
     return [
@@ -303,14 +290,7 @@ def _cycles(done: Experiments) -> list[Comparison]:
         say("least_gain_efficiency_number", min(number), number[0], number[1]),
         say("gain_two_four", min(lightest), lightest[0], lightest[1]),
         say("largest_overshoot_angle", over),
-        say(
-            "efficiency_slow_PI",
-            float(slow[np.argmax(np.abs(np.log(slow)))]),
-            slow.min(),
-            slow.max(),
-            short.min(),
-            short.max(),
-        ),
+        say("efficiency_slow_PI", farthest, slow.min(), slow.max(), short.min(), short.max()),
         say("length_eight_cycles", 8.0 * rec.CYCLE),
         *_beside_balance(done),
         *_loops(done),
@@ -393,17 +373,11 @@ def _limits(done: Experiments, best: Mapping[float, tuple[int, int]]) -> list[Co
 def _rubber(done: Experiments) -> list[Comparison]:
     cases = MATRIX[90.0]
     with_, without = (100.0 * _of(found, cases) for found in (done.steep, done.bare))
-    bound = _bound(done)
+    least, highest = float(without.min()), done.bare.pressure[done.bare.row(0.0, 6)].max() / BAR
     return [
         say("elasticity_least_efficiency", float(with_.min()), 100 * done.steep.of(9.0, 6)),
         say("elasticity_largest_efficiency", float(with_.max())),
-        say(
-            "without_elasticity_least",
-            float(without.min()),
-            done.bare.pressure[done.bare.row(0.0, 6)].max() / BAR,
-            bound,
-            100 * done.bare.of(9.0, 6),
-        ),
+        say("without_elasticity_least", least, highest, _bound(done), 100 * done.bare.of(9.0, 6)),
         say("without_elasticity_largest", float(without.max())),
         *_turned(done),
     ]
@@ -412,17 +386,10 @@ def _rubber(done: Experiments) -> list[Comparison]:
 def _turned(done: Experiments) -> list[Comparison]:
     """Which number of muscles is best and worst without elasticity."""
     bare = 100.0 * np.array([[done.bare.of(p, n) for n in MUSCLES] for p in (0.0, 27.0)])
+    empty, heavy = (", ".join(f"{x:.1f}" for x in row) for row in bare)
     return [
-        say(
-            "without_elasticity_0",
-            float(bare[0, 0] - bare[0, 1:].max()),
-            ", ".join(f"{x:.1f}" for x in bare[0]),
-        ),
-        say(
-            "without_elasticity_27",
-            float(bare[1, 0] - bare[1, 1:].min()),
-            ", ".join(f"{x:.1f}" for x in bare[1]),
-        ),
+        say("without_elasticity_0", float(bare[0, 0] - bare[0, 1:].max()), empty),
+        say("without_elasticity_27", float(bare[1, 0] - bare[1, 1:].min()), heavy),
     ]
 
 
@@ -457,30 +424,18 @@ def _tests(done: Experiments) -> list[Comparison]:
     own = found.row(18.0, 2)
     tops = found.tops()[own]
     drop = (found.source[own, 0] - found.source[own, -1]) / BAR
+    mean = [f"{p:g} kg: {np.nanmean(line):.0f}" for p, line in zip(PAYLOADS, work, strict=True)]
+    smooth, rubbing = loop_width(done.steep, own), loop_width(_hysteretic(), 0)
     return [
-        say(
-            "largest_spread_work",
-            100.0 * float(spread.max()),
-            "; ".join(
-                (
-                    f"{p:g} kg: {float(np.nanmean(line)):.0f}"
-                    for p, line in zip(PAYLOADS, work, strict=True)
-                )
-            ),
-        ),
+        say("largest_spread_work", 100.0 * float(spread.max()), "; ".join(mean)),
         say("18_kg_2", float(np.ptp(tops)), drop),
-        say(
-            "18_kg_2_muscles",
-            100.0 * loop_width(done.steep, own),
-            100 * loop_width(_hysteretic(), 0),
-        ),
+        say("18_kg_2_muscles", 100.0 * smooth, 100 * rubbing),
     ]
 
 
 def _hysteretic() -> Cycles:
-    return rec.lifting(
-        [(18.0, 2)], 90.0, 2, changed=rec.SUSPECTS["hysteresis of the muscles (2.36)"]
-    )
+    changed = rec.SUSPECTS["hysteresis of the muscles (2.36)"]
+    return rec.lifting([(18.0, 2)], 90.0, 2, changed=changed)
 
 
 def loop_width(found: Cycles, row: int) -> float:

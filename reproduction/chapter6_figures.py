@@ -19,8 +19,6 @@ from reproduction.chapter6 import BAR, latest, say
 from reproduction.page import Picture
 from reproduction.recruiting import EXTENDED, MATRIX, MUSCLES, PAYLOADS, Cycles
 
-__all__ = ["pictures"]
-
 _COLOUR: Final = dict(zip(MUSCLES, ("#d55e00", "#0072b2", "#1f1f1f"), strict=True))
 _BAND: Final[dict[str, Any]] = {"color": "#c4c8ce", "alpha": 0.5, "zorder": 0, "lw": 0.0}
 
@@ -45,22 +43,15 @@ def pictures() -> list[Picture]:
 
 def _pair() -> Figure:
     figure, cells = drawing.axes(1, 2, 3.2)
-    for cell, name, title in (
-        (cells[0], "pam_a_1in", "A, latex"),
-        (cells[1], "pam_b_075in", "B, silicone"),
-    ):
+    shown = (("pam_a_1in", "A, latex"), ("pam_b_075in", "B, silicone"))
+    for cell, (name, title) in zip(cells, shown, strict=True):
         muscle = entry(name).muscle
         for pressure, colour in ((2.0, COLOURS["before"]), (4.0, COLOURS["after"])):
             for count, style in ((1, "-"), (2, "--")):
                 own = 2.0 * pressure / count * BAR
                 e = np.linspace(0.0, free_contraction(muscle, own), 200)
-                cell.plot(
-                    100.0 * e,
-                    count * muscle.force(own, e) / 1e3,
-                    style,
-                    color=colour,
-                    label=f"{count} at {own / BAR:g} bar",
-                )
+                force, label = count * muscle.force(own, e) / 1e3, f"{count} at {own / BAR:g} bar"
+                cell.plot(100.0 * e, force, style, color=colour, label=label)
         cell.set(title=title, xlabel="contraction [%]")
         cell.set_ylim(bottom=0.0)
     cells[0].set_ylabel("force [kN]")
@@ -73,14 +64,8 @@ def _lines(cell: Axes, found: Cycles, values: Any, style: str = "-", label: str 
     allowed = MATRIX[found.high]
     for n in MUSCLES:
         rows = [found.row(p, n) for p in PAYLOADS]
-        cell.plot(
-            PAYLOADS,
-            values[rows],
-            style,
-            color=_COLOUR[n],
-            lw=1.2,
-            label=f"{n} muscles{label}",
-        )
+        words = f"{n} muscles{label}"
+        cell.plot(PAYLOADS, values[rows], style, color=_COLOUR[n], lw=1.2, label=words)
         for p, row in zip(PAYLOADS, rows, strict=True):
             face = _COLOUR[n] if (p, n) in allowed else "white"
             cell.plot(p, values[row], "o", ms=4.5, mec=_COLOUR[n], mfc=face)
@@ -143,13 +128,8 @@ def _readings() -> Figure:
             done[name], (COLOURS["before"], COLOURS["after"]), (0.13, -0.13), strict=True
         ):
             values = 100.0 * np.array([found.of(*case) for case in MATRIX[90.0]])
-            cell.plot(
-                [values.min(), values.max()],
-                [place + shift] * 2,
-                color=colour,
-                lw=3.0,
-                solid_capstyle="butt",
-            )
+            ends = [values.min(), values.max()]
+            cell.plot(ends, [place + shift] * 2, color=colour, lw=3.0, solid_capstyle="butt")
             cell.plot(values, [place + shift] * values.size, "|", ms=7, color="#1f1f1f", mew=0.8)
     cell.set_yticks(range(len(names)), names)
     cell.set_xlabel("efficiency [%]")
@@ -163,10 +143,8 @@ def _time() -> Figure:
     row = found.row(18.0, 2)
     angle, torque = np.degrees(found.angle[row]), found.torque[row]
     rising = np.concatenate([[False], np.diff(found.angle[row]) > 5e-5])
-    for cell, values, label in (
-        (cells[0], angle, "angle [deg]"),
-        (cells[1], torque, "torque [N m]"),
-    ):
+    shown = ((cells[0], angle, "angle [deg]"), (cells[1], torque, "torque [N m]"))
+    for cell, values, label in shown:
         cell.plot(found.time, values, color="#1f1f1f", lw=1.0)
         cell.plot(found.time, np.where(rising, values, np.nan), color="#d62728", lw=1.8)
         cell.set_ylabel(label)
@@ -182,24 +160,16 @@ def _time() -> Figure:
 def _loops() -> Figure:
     figure, cells = drawing.axes(1, 2, 3.2, sharey=True)
     base = latest().readings["as it is"][0]
-    rubbing = rec.lifting(
-        [(18.0, 2)], 90.0, 2, changed=rec.SUSPECTS["hysteresis of the muscles (2.36)"]
-    )
-    for cell, found, title in (
-        (cells[0], base, "the rig as it is"),
-        (cells[1], rubbing, "with hysteresis (2.36)"),
-    ):
+    changed = rec.SUSPECTS["hysteresis of the muscles (2.36)"]
+    rubbing = rec.lifting([(18.0, 2)], 90.0, 2, changed=changed)
+    titles = ("the rig as it is", "with hysteresis (2.36)")
+    for cell, found, title in zip(cells, (base, rubbing), titles, strict=True):
         row = found.row(18.0, 2)
         now = found.time - rec.CYCLE
         for begin, colour, label in ((0.0, "#d62728", "up"), (11.0, COLOURS["after"], "down")):
             part = (now >= begin) & (now <= begin + 11.0)
-            cell.plot(
-                found.pressure[row][part] / BAR,
-                found.torque[row][part],
-                color=colour,
-                lw=1.2,
-                label=label,
-            )
+            pressure, torque = found.pressure[row][part] / BAR, found.torque[row][part]
+            cell.plot(pressure, torque, color=colour, lw=1.2, label=label)
         cell.set(title=title, xlabel="pressure [bar]")
     cells[0].set_ylabel("torque [N m]")
     cells[0].legend(fontsize=7.5, frameon=False)
@@ -209,10 +179,8 @@ def _loops() -> Figure:
 def _energy() -> Figure:
     figure, cells = drawing.axes(1, 2, 3.2)
     found = latest().steep
-    for cell, values, label in (
-        (cells[0], found.work, "work [kJ]"),
-        (cells[1], found.energy, "input energy [kJ]"),
-    ):
+    labels = ("work [kJ]", "input energy [kJ]")
+    for cell, values, label in zip(cells, (found.work, found.energy), labels, strict=True):
         _lines(cell, found, values / 1e3)
         cell.set_ylabel(label)
         cell.set_ylim(bottom=0.0)
@@ -233,9 +201,8 @@ def _suspects() -> Figure:
     figure, (cell,) = drawing.axes(1, 1, 0.28 * len(names) + 1.2)
     for place, name in enumerate(names):
         for (_, n), value in zip(MATRIX[90.0], sets[name], strict=True):
-            cell.plot(
-                100.0 * (value - 1.0), place + 0.18 * (n - 4) / 2, "o", ms=4, color=_COLOUR[n]
-            )
+            at = place + 0.18 * (n - 4) / 2
+            cell.plot(100.0 * (value - 1.0), at, "o", ms=4, color=_COLOUR[n])
     for n in MUSCLES:
         cell.plot([], [], "o", ms=4, color=_COLOUR[n], label=f"{n} muscles")
     cell.axvline(0.0, color="#9ca3af", lw=1.0)

@@ -20,7 +20,6 @@ from reproduction.recruiting import MUSCLES, Case, Cycles
 if TYPE_CHECKING:
     from reproduction.chapter6 import Experiments
 
-__all__ = ["SLOW", "LoopMargin", "balance", "by_number", "lasting", "margins", "table"]
 
 #: The run whose whole loop has no margin without dry friction.
 SLOW: Final = "PI without the rate, a quarter as fast"

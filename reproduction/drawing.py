@@ -16,8 +16,6 @@ from pamrs.report.figures import STYLE
 from reproduction.page import Picture
 from reproduction.statements import Statements
 
-__all__ = ["axes", "figure", "pictures", "png"]
-
 
 def figure(rows: int = 1, columns: int = 1, height: float = 3.6, **more: Any) -> tuple[Figure, Any]:
     """An empty figure, 8 in wide.

@@ -31,13 +31,6 @@ from reproduction.rigs import with_struts
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = [
-    "FOOT_POUND", "HYSTERESIS", "INCH", "LAWS", "POUND", "PSI", "StaticCurve", "Step", "arm_rig",
-    "at_same_pressure", "braid", "braid_angle", "elbow_torque",
-    "mooney_rivlin", "payload_torque", "ramp_and_hold", "rest_angle", "rotation_reached",
-    "static_curve", "steeper_braid", "step",
-    "torque_range", "triangle", "valve_for_peak", "with_muscle", "without_supply",
-]  # fmt: skip
 
 Array = NDArray[np.float64]
 

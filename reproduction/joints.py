@@ -25,8 +25,6 @@ from pamrs.library import entry
 from pamrs.units import to_si
 from reproduction.statements import Lines, Statements
 
-__all__ = ["CASES", "PublishedCase", "facts_of_geometry", "facts_of_search"]
-
 _FOOT_POUND: Final = to_si(1.0, "ft lbf", "torque")
 _PSI: Final = to_si(1.0, "psi", "pressure")
 _INCH: Final = 0.0254

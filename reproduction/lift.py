@@ -37,29 +37,6 @@ from reproduction.elbow import HYSTERESIS, POUND, with_muscle
 from reproduction.rigs import with_struts
 from reproduction.two_branches import two_branches
 
-__all__ = [
-    "GAINS",
-    "HIGH",
-    "LOW",
-    "PAYLOADS",
-    "PERIOD",
-    "VARIANTS",
-    "Gains",
-    "Lifts",
-    "Map",
-    "Variant",
-    "assumed",
-    "derivative_line",
-    "fuzzy_map",
-    "lengthening",
-    "lifts",
-    "pid_map",
-    "plant",
-    "predicted",
-    "rate_line",
-    "trajectory",
-]
-
 Array = NDArray[np.float64]
 #: Gains of a controller, each one number or one for each payload.
 Gains = tuple[float | tuple[float, ...], ...]

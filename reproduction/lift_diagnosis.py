@@ -28,7 +28,6 @@ from reproduction.lift import (
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis
 
-__all__ = ["NOISE", "diagnosed", "recorded"]
 
 #: Standard deviation of each sensor, SI; the command is known.
 NOISE: Final = {
@@ -73,16 +72,8 @@ def recorded(
     }
     channels["valve_command"] = run.command
     mask = {name: np.ones(n, dtype=bool) for name in channels}
-    return Recording(
-        f"{path.name}_{seed}",
-        role,
-        run.time,
-        PERIOD,
-        channels,
-        mask,
-        [],
-        dict.fromkeys(channels, "SI"),
-    )
+    name, units = f"{path.name}_{seed}", dict.fromkeys(channels, "SI")
+    return Recording(name, role, run.time, PERIOD, channels, mask, [], units)
 
 
 def diagnosed(name: str, *, payload: float = PAYLOADS[1], duration: float = 25.0) -> Diagnosis:

@@ -25,8 +25,6 @@ from pamrs.control.linear import LinearController, LinearModel, linear_controlle
 from pamrs.control.stability import spectral_radius
 from pamrs.rig import Joint, Rig
 
-__all__ = ["MARGIN", "bearable", "fastest", "holding", "inner_gains", "inner_margin", "loop_margin"]
-
 #: Factor that a pressure loop of :func:`inner_gains` leaves at its fastest point.
 MARGIN: Final = 2.0
 #: Largest factor that is looked for; a loop that bears more counts as bearing this.

@@ -11,8 +11,6 @@ from pamrs.comparison import Comparison, verdicts
 from reproduction.statement_tables import markdown
 from reproduction.statements import text
 
-__all__ = ["Picture", "Section", "page"]
-
 
 @dataclass(frozen=True)
 class Picture:

@@ -25,32 +25,6 @@ from reproduction.elbow import HYSTERESIS, with_muscle
 from reproduction.margins import inner_gains, loop_margin
 from reproduction.rigs import with_struts
 
-__all__ = [
-    "CYCLE",
-    "EXTENDED",
-    "FILTER",
-    "GAINS",
-    "LOW",
-    "MATRIX",
-    "MUSCLES",
-    "NONE",
-    "PAYLOADS",
-    "READINGS",
-    "SLOW",
-    "SLOWER",
-    "SUSPECTS",
-    "Case",
-    "Cycles",
-    "beside_idle",
-    "case_gains",
-    "controller",
-    "inner_loop",
-    "lifting",
-    "plant",
-    "rig_of",
-    "whole_margin",
-]
-
 Array = NDArray[np.float64]
 #: Payload [kg] and number of muscles.
 Case = tuple[float, int]

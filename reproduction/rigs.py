@@ -7,8 +7,6 @@ from typing import Final
 from pamrs.rig import Rig
 from pamrs.rigs import named
 
-__all__ = ["STRUT", "with_struts"]
-
 STRUT: Final = 1e9  # buckling load of a muscle that never buckles [N]
 
 

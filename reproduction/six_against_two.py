@@ -14,8 +14,6 @@ from pamrs.design.sizing import Candidate, Filling, Requirement, SizingResult, s
 from pamrs.library import entry
 from pamrs.units import to_si
 
-__all__ = ["compare_design", "elbow_requirement", "six_against_two"]
-
 #: Elbow joint of 3.2.4: axial length, offset and tendon length [in].
 _AXIAL, _OFFSET, _TENDON = 1.56, 0.42, 3.04
 

@@ -22,20 +22,6 @@ from pamrs.fit import ForceMap, MuscleFit, fit_friction, fit_muscle
 from pamrs.library import ch2_075in
 from pamrs.rig import Muscle
 
-__all__ = [
-    "COUNT",
-    "EXTENSION",
-    "LEVELS",
-    "ORDERS",
-    "PSI",
-    "THREE",
-    "Fits",
-    "StandIn",
-    "fits",
-    "hysteresis",
-    "stand_in",
-]
-
 Array = NDArray[np.float64]
 
 PSI: Final = 6894.757293

@@ -11,8 +11,6 @@ from typing import Any
 
 from pamrs.comparison import Comparison
 
-__all__ = ["Told", "markdown", "to_csv"]
-
 
 class Told:
     """Statements by the short name of their group, for sentences about them.

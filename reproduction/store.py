@@ -22,8 +22,6 @@ import pamrs
 from pamrs.comparison import Comparison
 from reproduction.page import Picture, Section
 
-__all__ = ["digest", "folder", "inputs", "keep", "kept"]
-
 #: Folders of the package, of its reproduction, and of the other code that chapter 6 stands beside.
 _ROOTS: Final = (
     Path(pamrs.__file__).parent,

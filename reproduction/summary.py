@@ -10,8 +10,6 @@ from pamrs.comparison import KINDS, Comparison
 from reproduction.page import Section
 from reproduction.statements import text
 
-__all__ = ["counts", "summary"]
-
 
 def counts(section: Section) -> dict[str, int]:
     """How many statements have each kind of verdict, and how many lines stand apart.

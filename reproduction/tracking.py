@@ -38,24 +38,6 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from reproduction.rigs import with_struts
 
-__all__ = [
-    "GAINS",
-    "KINDS",
-    "PAYLOADS",
-    "PERIOD",
-    "POUND",
-    "SETTLED",
-    "Track",
-    "Tuning",
-    "arm_model",
-    "controller",
-    "follow",
-    "lift",
-    "plant",
-    "tuned",
-    "waves",
-]
-
 Array = NDArray[np.float64]
 
 POUND: Final = 0.45359237

@@ -29,18 +29,6 @@ from reproduction.tracking import (
 if TYPE_CHECKING:
     from pamrs.diagnosis.result import Diagnosis
 
-__all__ = [
-    "CASES",
-    "EFFECTS",
-    "FULL",
-    "HYSTERESIS",
-    "MIDDLE",
-    "SHORT",
-    "STARTS",
-    "TRIALS",
-    "WRONG",
-    "Plan",
-]
 
 Parameters = tuple[tuple[str, float], ...]
 

@@ -11,8 +11,6 @@ from pamrs.rig import Muscle
 from pamrs.rigs import named
 from reproduction.elbow import PSI
 
-__all__ = ["FACTORS", "two_branches"]
-
 #: Of (4.7): on the wall's pressure, on FL and on FT.
 FACTORS: Final = (0.3, 0.8, 0.8)
 _FREE: Final = 0.37  # contraction of the unloaded muscle at 150 psi, 3.2.2

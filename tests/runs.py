@@ -98,45 +98,27 @@ class Run:
 
     def core(self, step: float | None = None) -> pamrs.Simulation:
         """Simulate with pamrs at a step (s)."""
-        return pamrs.simulate(
-            self.plant,
-            sample_time=self.sample_time,
-            step=step,
-            initial=self.initial,
-            **self.keywords,
-        )
+        own = {"sample_time": self.sample_time, "initial": self.initial}
+        return pamrs.simulate(self.plant, step=step, **own, **self.keywords)
 
     def reference(
         self, rtol: float = 1e-12, method: Literal["DOP853", "Radau"] = "DOP853"
     ) -> dict[str, Array]:
         """Integrate with the reference; channels by the core's names, supplies' masses left out."""
         rows = None if self.commands else self.rows
-        found = network.simulate(
-            self.model,
-            self.commands,
-            self.sample_time,
-            self.initial,
-            rtol,
-            rows=rows,
-            method=method,
-        )
+        given = (self.model, self.commands, self.sample_time, self.initial, rtol)
+        found = network.simulate(*given, rows=rows, method=method)
         named = {}
         for name, values in found.items():
             channel, dot, block = name.partition(".")
-            named[CALLED.get(channel, channel) + dot + block] = values
-        return {
-            name: values
-            for name, values in named.items()
-            if not name.startswith("supply_air_mass") and name != "time"
-        }
+            if channel not in ("supply_air_mass", "time"):
+                named[CALLED.get(channel, channel) + dot + block] = values
+        return named
 
     def lasting(self, rows: int) -> Run:
         """The same with fewer rows."""
-        return replace(
-            self,
-            rows=rows,
-            commands={name: values[:rows] for name, values in self.commands.items()},
-        )
+        commands = {name: values[:rows] for name, values in self.commands.items()}
+        return replace(self, rows=rows, commands=commands)
 
 
 def misses(got: Mapping[str, Array], want: Mapping[str, Array]) -> dict[str, float]:

@@ -37,6 +37,13 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _shown(text: str, file: Path | None) -> None:
+    """Print a page, and write it where a file is given."""
+    print(text)
+    if file is not None:
+        write(file, text)
+
+
 def _add_write(add: Add) -> None:
     whole = add(
         "write", help="write the cases, keys and manifest of a plan; goes on where it was stopped"
@@ -90,10 +97,7 @@ def _score(args: argparse.Namespace) -> None:
         digest, count = checked(folder)
         head += about(folder, digest, count, run_of(args.results, digest), args.words)
     told = scores(found)
-    text = "\n".join([*head, markdown(told)])
-    print(text)
-    if args.markdown is not None:
-        write(args.markdown, text)
+    _shown("\n".join([*head, markdown(told)]), args.markdown)
     if args.json is not None:
         write(args.json, to_json(told))
 
@@ -118,10 +122,7 @@ def _pool(args: argparse.Namespace) -> None:
         if not args.cases.name.endswith(CASES):
             raise ValueError(f"--cases {args.cases}: the name must end in {CASES}")
         args.cases.write_bytes(table_of_cases(trials))
-    text = pooled_page(trials)
-    print(text)
-    if args.markdown is not None:
-        write(args.markdown, text)
+    _shown(pooled_page(trials), args.markdown)
 
 
 def _add_insert(add: Add) -> None:
@@ -143,10 +144,7 @@ def _insert(args: argparse.Namespace) -> None:
         print(line, file=sys.stderr, flush=True)
 
     results = args.results or args.folder / "results"
-    text = insertion_table(all_inserted(args.folder, results, told))
-    print(text)
-    if args.markdown is not None:
-        write(args.markdown, text)
+    _shown(insertion_table(all_inserted(args.folder, results, told)), args.markdown)
 
 
 def _add_make(add: Add) -> None:

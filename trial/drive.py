@@ -107,6 +107,3 @@ class Driver(Loop):
         if self.regulated:
             return self.quantise(wanted * 1.0e-5 + dither)
         return self.opened(wanted - pressure, self.null, dither)
-
-
-__all__ = ["FREE", "Driver", "course", "free_log", "range_of"]

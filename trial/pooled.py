@@ -17,8 +17,6 @@ from .marks import BlockMark, Mark
 from .summary import percent, table
 from .tables import SCHEMA, SHARES, scores, share_of, tables
 
-__all__ = ["CASES", "page", "pooled", "table_of_cases"]
-
 #: ending of a table of scored cases
 CASES = ".jsonl.gz"
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,10 +73,17 @@ class Steering(Protocol):
 
 
 class CommandPath:
-    """What a command goes through on its way to the opening of the valve."""
+    """What a command goes through on its way to the opening of the valve.
+
+    `kinds` has the number of each channel among :data:`CHANNELS`, `shut` the opening of no command,
+    `clocks` the effects that may make a log late.
+    """
+
+    kinds: tuple[int, ...] = (0, 1, 2)
+    shut: Any = 0.0
 
     def __init__(self, plant: Plant, sample_time: float = SAMPLE_TIME) -> None:
-        self.plant, self.sample_time = plant, sample_time
+        self.plant, self.sample_time, self.clocks = plant, sample_time, plant.effects
         delay = sum(e.delay() for e in plant.effects)
         self.whole = int(delay / sample_time)
         self.part = delay - self.whole * sample_time
@@ -93,6 +100,13 @@ class CommandPath:
         old, new = self.past[-self.whole - 2], self.past[-self.whole - 1]
         spans = [(old, self.part), (new, self.sample_time - self.part)]
         return [s for s in spans if s[1] > 1.0e-9]
+
+    def begun(self, state: State, shift: tuple[float, ...], tank: State, clock: float) -> State:
+        """State of the plant at a time [s] as that of another one, but for its tank, with shifts of
+        the pressure [Pa] and the angle [rad].
+        """
+        pressure, angle = state[0] + shift[0], state[2] + shift[1]
+        return self.plant.initial(pressure, tank[1], angle, state[3], clock)
 
 
 def open_loop(nominal: Plant, shape: Excitation, control: Controller) -> Array:
@@ -154,39 +168,63 @@ def run(
     start : list of float, optional
         State at the start; at rest by default.
     """
-    n = len(shape.reference)
     control.reset()
-    white = rng.standard_normal((n, 3)) * [noise.pressure, noise.pressure, noise.angle]
-    grid = np.array([noise.pressure_step, noise.pressure_step, noise.angle_step])
-    noisy, steps = white.tolist(), grid.tolist()
     reference, dither, sealed = (
         shape.reference.tolist(),
         shape.dither.tolist(),
         shape.sealed.tolist(),
     )
-    sent: list[float] = []
-    clean: list[tuple[float, float, float]] = []
-    states: list[State] = []
+
+    def steer(i: int, measured: Iterator[float]) -> float:
+        if command is not None:
+            return float(command[i])
+        p, _, angle = measured
+        return control(reference[i], angle, p, dither[i], sealed[i])
+
     path = CommandPath(plant, sample_time)
+    y = start or plant.rest(supply + plant.par.ambient, RECORDING_PERIOD * index)
+    every = 1 if command is not None else held
+    return recorded(path, steer, len(reference), y, noise, rng, index, every)
+
+
+def recorded(
+    path: Any,
+    steer: Callable[[int, Iterator[float]], Any],
+    n: int,
+    y: State,
+    noise: Noise,
+    rng: np.random.Generator,
+    index: int,
+    held: int,
+) -> Record:
+    """A recording of `n` samples of the plant of a path, from a state.
+
+    `steer` gives the command, or those of a pair, from the number of a sample and what the channels
+    measure, every `held` samples; the others as :func:`run`.
+    """
+    plant, sample_time = path.plant, path.sample_time
+    spread = np.array([(noise.pressure, noise.angle)[k == 2] for k in path.kinds])
+    grid = np.array([(noise.pressure_step, noise.angle_step)[k == 2] for k in path.kinds])
+    white = rng.standard_normal((n, len(path.kinds))) * spread
+    noisy, steps = white.tolist(), grid.tolist()
+    sent: list[Any] = []
+    clean: list[tuple[float, ...]] = []
+    states: list[State] = []
     begin = RECORDING_PERIOD * index
-    y = start or plant.rest(supply + plant.par.ambient, begin)
-    opening, step, u = 0.0, 1.0e-3, 0.0
+    opening, step, u = path.shut, 1.0e-3, path.shut
     for i in range(n):
         y = plant.tick(y)
         states.append(y)
         reading = plant.reading(y, opening)
         clean.append(reading)
-        if command is not None:
-            u = float(command[i])
-        elif i % held == 0:
-            p = round((reading[0] + noisy[i][0]) / steps[0]) * steps[0]
-            angle = round((reading[2] + noisy[i][2]) / steps[2]) * steps[2]
-            u = control(reference[i], angle, p, dither[i], sealed[i])
+        if i % held == 0:
+            measured = zip(reading, noisy[i], steps, strict=True)
+            u = steer(i, (round((v + e) / s) * s for v, e, s in measured))
         sent.append(u)
         for opening, span in path.spans(u, begin + i * sample_time):
             y, step = plant.advance(y, opening, span, step)
     time = sample_time * np.arange(n)
-    true = late(plant.effects, time, np.array(clean))
+    true = late(path.clocks, time, np.array(clean), path.kinds)
     return Record(time, np.array(sent), np.round((true + white) / grid) * grid, true, states)
 
 
@@ -210,53 +248,54 @@ def late(effects: Effects, time: Array, clean: Array, kinds: tuple[int, ...] = (
 
 
 def follow(
-    bare: Plant,
+    bare: Any,
     record: Record,
     index: int = 0,
-    shift: tuple[float, float] = (0.0, 0.0),
+    shift: tuple[float, ...] = (0.0, 0.0),
     window: float = 2.0,
     sample_time: float = SAMPLE_TIME,
+    way: Callable[[Any, float], Any] = CommandPath,
 ) -> Array:
-    """Noise-free readings (n, 3) of a plant that gets the commands of a recording of another one.
+    """Noise-free readings (n, 3), or (n, 4) of a pair, of a plant that gets the commands of a
+    recording of another one.
 
     Its muscle pressure, angle and rate start from the true state every `window` [s], the tank runs
     through. One classical Runge-Kutta step per sample: its error is some thousandths of the noise.
 
     Parameters
     ----------
-    bare : Plant
+    bare : Plant or PairPlant
         Without a delay in its command path.
     record : Record
         With the true states.
     index : int
         Number of the recording in the case.
     shift : tuple of float
-        Added to the pressure [Pa] and angle [rad] at the starts.
+        Added to each pressure [Pa] and to the angle [rad] at the starts.
     window : float
         Length of a window [s].
     sample_time : float
         Sample time of the recording [s].
+    way : callable
+        Makes the path of the commands: :class:`CommandPath`, or that of a pair.
     """
     every = round(window / sample_time)
     parts = max(1, math.ceil(sample_time / 6.0e-3))
-    found: list[tuple[float, float, float]] = []
-    path = CommandPath(bare, sample_time)
+    found: list[tuple[float, ...]] = []
+    path = way(bare, sample_time)
     begin = RECORDING_PERIOD * index
-    command = record.command.tolist()
-    opening = 0.0
+    opening = path.shut
     y: State = []
-    for i, state in enumerate(record.states):
+    for i, (state, command) in enumerate(zip(record.states, record.command.tolist(), strict=True)):
+        clock = begin + i * sample_time
         if i % every == 0:
-            supply = y[1] if y else state[1]
-            y = bare.initial(
-                state[0] + shift[0], supply, state[2] + shift[1], state[3], begin + i * sample_time
-            )
+            y = path.begun(state, shift, y or state, clock)
         y = bare.tick(y)
         found.append(bare.reading(y, opening))
-        for opening, span in path.spans(command[i], begin + i * sample_time):
+        for opening, span in path.spans(command, clock):
             for _ in range(parts):
                 y = bare.classical(y, opening, span / parts)
-    return late(bare.effects, record.time, np.array(found))
+    return late(path.clocks, record.time, np.array(found), path.kinds)
 
 
 def reach(moved: Array, noise: Noise) -> dict[str, float]:

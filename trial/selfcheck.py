@@ -118,40 +118,33 @@ def selfcheck(golden: Path | None = None) -> str:
         A check failed.
     """
     parameters = to_parameters(read_rig(default_rig())[0])
-    plant = Plant(parameters)
+    plant, pair = Plant(parameters), nominal_pair().par
     lines: list[str] = []
     bad: list[str] = []
+
+    def check(text: str, error: float, most: float) -> None:
+        lines.append(text)
+        if not error < most:
+            bad.append(text)
+
     for path in sorted(golden.glob("shoulder_*.csv")) if golden else ():
         errors = against_golden(plant, path)
-        lines.append(
-            f"golden {path.stem}: "
-            + ", ".join(f"{k} {v:.1e}" for k, v in errors.items())
-            + " of range"
-        )
+        told = ", ".join(f"{k} {v:.1e}" for k, v in errors.items())
         # a strike on the stiff stop amplifies every rounding
-        if not max(errors.values()) < (1.0e-5 if "choked" in path.stem else 1.0e-7):
-            bad.append(lines[-1])
+        most = 1.0e-5 if "choked" in path.stem else 1.0e-7
+        check(f"golden {path.stem}: {told} of range", max(errors.values()), most)
     error = against_fine(plant)
-    lines.append(f"steps a tenth as long: {error:.1e} of range")
-    if not error < 1.0e-7:
-        bad.append(lines[-1])
+    check(f"steps a tenth as long: {error:.1e} of range", error, 1.0e-7)
     rng = np.random.default_rng(1)
     for name in TYPES:
         error = against_lsoda(Plant(parameters, Effects(draw(name, 1.0, rng))))
-        lines.append(f"LSODA with {name}: {error:.1e}")
-        if not error < 1.0e-5:
-            bad.append(lines[-1])
-    pair = nominal_pair().par
+        check(f"LSODA with {name}: {error:.1e}", error, 1.0e-5)
     error = against_fine(PairPlant(pair))
-    lines.append(f"pair, steps a tenth as long: {error:.1e} of range")
-    if not error < 1.0e-7:
-        bad.append(lines[-1])
+    check(f"pair, steps a tenth as long: {error:.1e} of range", error, 1.0e-7)
     for name, kind in TYPES.items():
         at = BOTH if has_place(name, kind.block) else ""
         error = against_lsoda(PairPlant(pair, (Placed(draw(name, 1.0, rng), at),)))
-        lines.append(f"pair, LSODA with {name}: {error:.1e}")
-        if not error < 1.0e-5:
-            bad.append(lines[-1])
+        check(f"pair, LSODA with {name}: {error:.1e}", error, 1.0e-5)
     if bad:
         raise ValueError("self-check failed:\n" + "\n".join(bad))
     return "\n".join(lines)

@@ -13,8 +13,6 @@ import numpy as np
 
 from . import LAMINAR, SAMPLE_TIME, STEPS, Array, Shoulder
 
-__all__ = ["batch", "batch_diffrax"]
-
 jax.config.update("jax_enable_x64", True)
 H = SAMPLE_TIME / STEPS
 

@@ -10,8 +10,6 @@ from numba import njit, prange
 
 from . import LAMINAR, SAMPLE_TIME, STEPS, Array, Shoulder
 
-__all__ = ["batch", "single"]
-
 
 @njit(fastmath=True, inline="always")
 def flow(p, area, upstream, downstream):

@@ -15,8 +15,6 @@ from scipy.integrate import solve_ivp
 
 from . import LAMINAR, SAMPLE_TIME, Array, Shoulder
 
-__all__ = ["rates", "single"]
-
 #: What one cell of the table says: slope and offset of the force, volume, its slope.
 Look = tuple[Any, Any, Any, Any]
 

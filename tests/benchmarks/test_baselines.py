@@ -1,6 +1,7 @@
 """The baselines of a trial on small cases: a sealed chamber with and without a leak."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,40 +14,27 @@ pytest.importorskip("sklearn")
 from benchmarks.baselines import sindy  # noqa: E402
 from benchmarks.baselines.__main__ import main  # noqa: E402
 from benchmarks.baselines.sheet import _signals, gap_closed  # noqa: E402
-from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.prepare import prepare
-from pamrs.recordings import Recording  # noqa: E402
+from pamrs.diagnosis.prepare import prepare  # noqa: E402
+from tests.diagnosis import again  # noqa: E402
+from tests.diagnosis.asked import SETTINGS  # noqa: E402
+from tests.diagnosis.held import RIG, hold  # noqa: E402
+from tests.diagnosis.noisy import SHOULDER, driven  # noqa: E402
 
-SETTINGS = DiagnosisSettings()
 
-
-def hold(folder, conductance, *starts):
+def holds(folder, conductance, *starts):
     """Holds of a known chamber, 60 s at 10 Hz, the last of them held out."""
-    rig = pamrs.rigs.sealed_chamber()
-    truth = rig.with_effect("leak_muscle", {"conductance": conductance}) if conductance else rig
-    folder.mkdir(parents=True)
-    (folder / "rig.toml").write_text(rig.to_toml_text())
-    text = 'schema = "pamrs.case/1"\nrig = "rig.toml"\n'
-    for i, start in enumerate(starts):
-        run = pamrs.simulate(
-            truth, duration=60.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": start}
-        )
-        pressure = run["muscle_pressure"] + np.random.default_rng(i).normal(
-            0.0, 150.0, run.time.size
-        )
-        rows = [f"{t:.1f},{p:.2f}" for t, p in zip(run.time, pressure, strict=True)]
-        (folder / f"hold_{i}.csv").write_text(
-            "\n".join(["time [s],muscle_pressure [Pa]", *rows]) + "\n"
-        )
-        role = "held_out" if i == len(starts) - 1 else "fit"
-        text += f'\n[[recording]]\nfile = "hold_{i}.csv"\nrole = "{role}"\n'
-    (folder / "case.toml").write_text(text)
+    found = []
+    for k, start in enumerate(starts):
+        role = "held_out" if k == len(starts) - 1 else "fit"
+        one = hold(conductance, 60.0, name=f"hold_{k}", seed=k, start=start)
+        found.append(replace(one, role=role, units={"muscle_pressure": "Pa"}))
+    again.written(pamrs.Case("holds", RIG, found, folder), folder)
 
 
 @pytest.mark.slow
 def test_a_leak_and_a_tight_chamber(tmp_path, capsys):
-    hold(tmp_path / "cases" / "leak", 3e-11, 7e5, 5e5, 6e5)
-    hold(tmp_path / "cases" / "tight", 0.0, 7e5, 5e5, 6e5)
+    holds(tmp_path / "cases" / "leak", 3e-11, 7e5, 5e5, 6e5)
+    holds(tmp_path / "cases" / "tight", 0.0, 7e5, 5e5, 6e5)
     assert main([str(tmp_path), "--jobs", "1"]) == 0
     out = tmp_path / "results" / "baselines"
     leak, tight = (json.loads((out / f"{name}.json").read_text()) for name in ("leak", "tight"))
@@ -98,14 +86,7 @@ def test_the_library_grows():
 def test_the_features_of_a_whole_arm_have_the_valves_opening():
     rig = pamrs.rigs.shoulder()
     command = 5.0 + 0.5 * np.sin(0.005 * np.arange(400))
-    run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
-    names = ("supply_pressure", "muscle_pressure", "joint_angle")
-    channels = {"valve_command": command, **{n: run[n] for n in names}}
-    mask = {n: np.ones(command.size, dtype=bool) for n in channels}
-    units = dict.fromkeys(channels, "")
-    prepared = prepare(
-        Recording("r", "fit", run.time, 0.005, channels, mask, [], units), rig, SETTINGS
-    )
-    found = _signals(prepared, rig)
+    one = driven(rig, "r", "fit", 0.005, {"valve_command": command}, SHOULDER, [1])
+    found = _signals(prepare(one, rig, SETTINGS), rig)
     assert set(found) == {"p", "dp", "q", "dq", "ps", "x"}
     assert np.allclose(found["x"], (command - 5.0) / rig.model["valve"]["half_range"])

@@ -8,27 +8,22 @@ import numpy as np
 
 import pamrs
 from pamrs.recordings import Recording
+from tests.diagnosis.noisy import SHOULDER as NOISE
+from tests.diagnosis.noisy import driven
 
-NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
+UNITS = dict(zip(("valve_command", *NOISE), ("V", "Pa", "Pa", "rad"), strict=True))
+
 ROLES = (("slow", "fit"), ("fast", "fit"), ("again", "held_out"))
 
 
 def recorded(rig: pamrs.Rig, name: str, role: str, seed: int, n: int = 1200) -> Recording:
     """A shoulder moved by two sines of its valve, 6 s at 200 Hz, with the noise of transducers."""
-    rng = np.random.default_rng([31, seed])
     time, speed = 0.005 * np.arange(n), 1.0 + 0.4 * seed
-    command = (
-        5.0
-        + 0.45 * np.sin(2.0 * np.pi * 0.2 * speed * time + seed)
-        + 0.3 * np.sin(2.0 * np.pi * 0.53 * speed * time)
-    )
-    run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
-    channels = {key: run[key] + rng.normal(0.0, level, n) for key, level in NOISE.items()}
-    channels["valve_command"] = command
-    mask = {key: np.ones(n, dtype=bool) for key in channels}
-    units = {"supply_pressure": "Pa", "muscle_pressure": "Pa", "joint_angle": "rad"}
-    units["valve_command"] = "V"
-    return Recording(name, role, run.time, 0.005, channels, mask, [], units)
+    wave = 0.45 * np.sin(2.0 * np.pi * 0.2 * speed * time + seed)
+    wave += 0.3 * np.sin(2.0 * np.pi * 0.53 * speed * time)
+    one = driven(rig, name, role, 0.005, {"valve_command": 5.0 + wave}, NOISE, [31, seed])
+    one.units.update(UNITS)
+    return one
 
 
 def case(truth: pamrs.Rig, nominal: pamrs.Rig, n: int = 1200) -> pamrs.Case:

@@ -12,79 +12,16 @@ import pamrs
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from tests.diagnosis.noisy import noisy
+from tests.tables import text_of
 
 DT = 0.01
 NOISE = {"muscle_pressure": 400.0, "length": 3e-5, "force": 1.0}
 BENCH = pamrs.rigs.bench()
 REST = BENCH.parameter("muscle.rest_length").value
 
-_HEAD = """
-schema = "pamrs.rig/1"
-name = "{name}"
-[gas]
-temperature = {{ value = 20, unit = "degC", tol = 2 }}
-[load]
-kind = "frame"
-min_length = {{ value = 220, unit = "mm" }}
-max_length = {{ value = 305, unit = "mm" }}
-[limits]
-max_pressure = {{ value = 6, unit = "bar" }}
-"""
-_MUSCLE = """
-[chamber{at}]
-dead_volume = {{ value = 30, unit = "ml", tol = 3 }}
-[muscle{at}]
-model = "gaylord"
-rest_length = {{ value = 300, unit = "mm" }}
-rest_diameter = {{ value = 23, unit = "mm" }}
-braid_angle = {{ value = 65, unit = "deg" }}
-wall_thickness = {{ value = 1.5, unit = "mm" }}
-modulus_scale = {{ value = 1, unit = "1", tol = 0.05 }}
-"""
-_VALVE = """
-[supply]
-kind = "tank"
-volume = {{ value = 10, unit = "l", tol = 0.2 }}
-initial_pressure = {{ value = 7, unit = "bar" }}
-[valve]
-flow                = "iso_6358"
-fill_conductance    = {{ value = 1.0, unit = "l/(s bar)", tol = 0.1 }}
-fill_critical_ratio = {{ value = 0.30, unit = "1", tol = 0.05 }}
-vent_conductance    = {{ value = 1.0, unit = "l/(s bar)", tol = 0.1 }}
-vent_critical_ratio = {{ value = 0.35, unit = "1", tol = 0.05 }}
-null_voltage        = {{ value = 5.0, unit = "V" }}
-half_range          = {{ value = 5.0, unit = "V" }}
-area_fraction       = {{ opening = [0.0, 1.0], fraction = [0.0, 1.0] }}
-"""
-_REGULATOR = """
-[supply]
-kind = "regulator"
-time_constant = {{ value = 80, unit = "ms", tol = 10 }}
-droop = {{ value = 3e8, unit = "Pa s/kg", tol = 0.5e8 }}
-initial_pressure = {{ value = 0, unit = "bar" }}
-[line]
-kind = "tube"
-from = "supply"
-to = "chamber"
-length = {{ value = 1, unit = "m", tol = 0.02 }}
-diameter = {{ value = 4, unit = "mm", tol = 0.1 }}
-"""
-
-
-def rig(name: str, *parts: str) -> pamrs.Rig:
-    """A rig on a frame: a muscle for each part that begins with a dot, or one without a name, and
-    what feeds it.
-    """
-    places = [part for part in parts if part.startswith(".")] or [""]
-    fed = [part for part in parts if not part.startswith(".")]
-    text = _HEAD.format(name=name) + "".join(_MUSCLE.format(at=at) for at in places)
-    return parse_rig(text + "".join(part.format() for part in fed))
-
-
-VALVED = rig("valved", _VALVE)
-REGULATED = rig("regulated", _REGULATOR)
-PAIR = rig("pair", ".left", ".right")
-RIGS = (BENCH, VALVED, REGULATED, PAIR)
+VALVED, REGULATED, PAIR = (
+    parse_rig(text_of(__file__, f"frame_{name}")) for name in ("valve", "regulator", "pair")
+)
 
 
 def played(

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts
-from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.noise import noise_levels
-from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
-from tests.diagnosis.noisy import noisy
+from tests.diagnosis.asked import problem_of
+from tests.diagnosis.noisy import driven
 
-SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.sealed_chamber()
 
 
@@ -28,15 +26,17 @@ def hold(
     name: str = "hold",
     seed: int = 1,
     step: float | None = 0.01,
+    start: float = 7e5,
     **leak: float,
 ) -> Recording:
-    """The chamber from 7 bar at 10 Hz with 150 Pa of noise, with a leak (0 for none)."""
+    """The chamber from 7 bar, or another pressure [Pa], at 10 Hz with 150 Pa of noise, with a leak
+    (0 for none).
+    """
     known = {"conductance": conductance, **leak}
     truth = RIG.with_effect("leak_muscle", known) if conductance else RIG
-    begin = {"muscle_pressure": 7e5}
-    run = pamrs.simulate(truth, duration=seconds, sample_time=0.1, step=step, initial=begin)
-    channels = {"muscle_pressure": run["muscle_pressure"]}
-    return noisy(name, "fit", 0.1, channels, {"muscle_pressure": 150.0}, [seed])
+    begin = {"muscle_pressure": start}
+    given = {"duration": seconds, "step": step, "initial": begin}
+    return driven(truth, name, "fit", 0.1, {}, {"muscle_pressure": 150.0}, [seed], **given)
 
 
 def held(conductance: float, seconds: float, **options: Any) -> pamrs.Case:
@@ -50,17 +50,12 @@ def attempts(plant: pamrs.Rig, pressures: Sequence[float], noise: float) -> Atte
     """
     kept = []
     for seed, pressure in enumerate(pressures):
-        made = pamrs.simulate(
-            plant, duration=60.0, sample_time=0.1, initial={"muscle_pressure": pressure}
-        )
-        channels = {"muscle_pressure": made["muscle_pressure"]}
-        recording = noisy(
-            f"hold{seed}", "fit", 0.1, channels, {"muscle_pressure": noise}, [7, seed]
-        )
-        kept.append(prepare(recording, RIG, SETTINGS))
-    blocks = available_blocks(RIG, ("muscle_pressure",))
-    core = core_rig(RIG)
-    inner, outer = (Problem(blocks, some, core, SETTINGS) for some in (kept[:-1], kept[-1:]))
+        given = {"duration": 60.0, "initial": {"muscle_pressure": pressure}}
+        sizes = {"muscle_pressure": noise}
+        kept.append(driven(plant, f"hold{seed}", "fit", 0.1, {}, sizes, [7, seed], **given))
+    every = problem_of(RIG, kept)
+    blocks, core, found = every.blocks, every.core, every.recordings
+    inner, outer = (replace(every, recordings=some) for some in (found[:-1], found[-1:]))
     levels = noise_levels(inner, core_rig(plant, core)) | noise_levels(outer, core_rig(plant, core))
     # what the baseline leaves: it only scales the gap that is closed
     out = {block.name: SimpleNamespace(ratio=9.0) for block in blocks}

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
+from typing import Any
 
 import numpy as np
 
-from pamrs.diagnosis.evidence import BlockLikelihood
+import pamrs
+from pamrs.diagnosis.evidence import BlockLikelihood, Candidate
 from pamrs.diagnosis.evidence._likelihood import _Covariance
+from pamrs.diagnosis.fit import Fit
 from pamrs.diagnosis.noise import Excess
+from pamrs.effects import Hypothesis
 
 BINS = 600
 TIMES = 0.1 * np.arange(BINS)
@@ -47,3 +51,27 @@ def of_ratio(ratio: float) -> BlockLikelihood:
 def leaving(kept: Mapping[str, Excess]) -> Callable[[], Mapping[str, BlockLikelihood]]:
     """That of what is left of each block."""
     return lambda: {block: of_ratio(found.ratio) for block, found in kept.items()}
+
+
+def made_up(
+    rig: pamrs.Rig,
+    key: str,
+    left: dict[str, Excess],
+    values: Mapping[str, float] | None = None,
+    **fitted: Any,
+) -> Candidate:
+    """A hypothesis by its text that leaves so much of each block, fitted and held out; values of
+    its fit may be given.
+    """
+    own = Hypothesis.parse(key).terms
+    effects = tuple(term for term in own if term.is_effect)
+    wrong = tuple(term.id for term in own if term.is_value)
+    known = dict(values or {})
+    usual = {
+        "std": {},
+        "covariance": np.zeros((len(known), len(known))),
+        "scales": dict.fromkeys(known, 1.0),
+        "freed": wrong,
+    }
+    fit = Fit(effects, rig, known, cost=0.0, residuals={}, **usual | fitted)
+    return Candidate(effects, fit, left, left, 0.0, wrong=wrong, likelihood=leaving(left))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -130,37 +131,18 @@ def sealed_chamber() -> Diagnosis:
 def nothing() -> Diagnosis:
     """Verdict `none`, as empty as it gets."""
     base = trace("step_up", "fit", "muscle_pressure", "Pa", 3e5, n=900)
-    same = Trace(
-        "step_up",
-        "fit",
-        "muscle_pressure",
-        "Pa",
-        base.time,
-        base.measured,
-        base.before,
-        base.refit,
-        base.refit,
-    )
+    nan = float("nan")
+    errors = {"noise": 1.0, "before": 1.0, "refit": nan, "after": nan}
+    empty: dict[str, Any] = {
+        **dict.fromkeys(("where", "parameters", "next_experiment", "residuals"), {}),
+        **dict.fromkeys(("effects", "warnings"), []),
+    }
     return diagnosis(
         verdict="none",
-        where={},
-        effects=[],
         probabilities={"none": 0.9999},
-        parameters={},
-        next_experiment={},
-        warnings=[],
-        residuals={},
-        traces=[same],
+        traces=[replace(base, after=base.refit)],
         text="",
         rig=None,
-        fit={
-            "channels": {
-                "muscle_pressure": {
-                    "noise": 1.0,
-                    "before": 1.0,
-                    "refit": float("nan"),
-                    "after": float("nan"),
-                }
-            }
-        },
+        fit={"channels": {"muscle_pressure": errors}},
+        **empty,
     )

@@ -42,11 +42,9 @@ def test_what_is_missing_beside_a_held_effect_is_named(found) -> None:
     assert [effect.id for effect in found.effects] == ["muscle_hysteresis"]
     assert found.where.block == "arm"
     # the leak is a term of the budget that is there already, and a parameter of the baseline
-    held = [term for term in found.budget if term.kind == "held"]
-    assert [(term.block, term.id, term.probability) for term in held] == [
-        ("chamber", "leak_muscle", None)
-    ]
-    assert held[0].share == pytest.approx(1.0, abs=0.1)
+    (held,) = [term for term in found.budget if term.kind == "held"]
+    assert (held.block, held.id, held.probability) == ("chamber", "leak_muscle", None)
+    assert held.share == pytest.approx(1.0, abs=0.1)
     fitted = found.parameters["leak_muscle.conductance"]
     assert abs(fitted.value - 1e-9) < 4.0 * fitted.std
     assert "holds already" in found.warnings[0]
@@ -105,17 +103,13 @@ def test_the_command_goes_on_from_the_model_that_it_wrote(
     assert cli.main(words) == 0
     told = json.loads(written.read_text(encoding="utf-8"))
     assert told["verdict"] == "none"
-    assert {t["id"] for t in told["budget"] if t["kind"] == "held"} == {
-        "leak_muscle",
-        "muscle_hysteresis",
-    }
+    held = {t["id"] for t in told["budget"] if t["kind"] == "held"}
+    assert held == {"leak_muscle", "muscle_hysteresis"}
     assert "holds already" in capsys.readouterr().out
     assert pamrs.load_rig(further).case == "../case"
 
 
 def test_the_command_takes_another_rig(tmp_path, capsys, monkeypatch) -> None:
-    import pamrs.diagnosis
-
     seen = []
 
     def noted(case: pamrs.Case, **options: object) -> pamrs.Diagnosis:
@@ -139,11 +133,9 @@ def test_a_note_of_the_case_stays_with_the_model(tmp_path) -> None:
     assert noted.with_parameters({"arm.payload": 1.0}).with_effect("muscle_creep").case == "../case"
     assert pamrs.load_rig(noted.to_toml(tmp_path / "rig.toml")).case == "../case"
     assert noted.with_case("").to_toml_text() == LEAKING.to_toml_text()
-    run = [
-        pamrs.simulate(rig, valve_command=np.full(20, 5.5), sample_time=0.01)
-        for rig in (noted, LEAKING)
-    ]
-    assert np.array_equal(run[0]["joint_angle"], run[1]["joint_angle"])
+    command = {"valve_command": np.full(20, 5.5), "sample_time": 0.01}
+    one, other = (pamrs.simulate(rig, **command)["joint_angle"] for rig in (noted, LEAKING))
+    assert np.array_equal(one, other)
 
 
 def test_known_of_a_held_parameter_is_at_least_a_share_of_it() -> None:
@@ -160,23 +152,16 @@ def test_values_of_held_effects_keep_place_form_and_deviation() -> None:
     for name, size in (("flexor", 1e-12), ("extensor", 2e-12)):
         made = {"conductance": size}
         rig = rig.with_effect("leak_muscle", made, std={"conductance": 0.1 * size}, at=name)
-    moved = with_known(
-        rig,
-        {"leak_muscle.flexor.conductance": 3e-12, "valve.flexor.null_voltage": 5.01},
-        {"leak_muscle.extensor.conductance": 5e-13},
-    )
-    assert [(e["at"], e["parameters"]["conductance"]) for e in moved.effects] == [
-        ("flexor", 3e-12),
-        ("extensor", 2e-12),
-    ]
+    values = {"leak_muscle.flexor.conductance": 3e-12, "valve.flexor.null_voltage": 5.01}
+    moved = with_known(rig, values, {"leak_muscle.extensor.conductance": 5e-13})
+    leaks = {e["at"]: e["parameters"]["conductance"] for e in moved.effects}
+    assert leaks == {"flexor": 3e-12, "extensor": 2e-12}
     assert moved.effect_std["leak_muscle.flexor"]["conductance"] == pytest.approx(1e-13)
     assert moved.effect_std["leak_muscle.extensor"]["conductance"] == 5e-13
     assert moved.parameter("valve.flexor.null_voltage").value == 5.01
     other = SHOULDER.with_effect("leak_muscle").with_effect("muscle_creep")
-    assert [e["id"] for e in with_effects_of(LEAKING, other, {"leak_muscle"}).effects] == [
-        "leak_muscle",
-        "muscle_creep",
-    ]
+    kept = with_effects_of(LEAKING, other, {"leak_muscle"}).effects
+    assert [e["id"] for e in kept] == ["leak_muscle", "muscle_creep"]
 
 
 def test_what_happens_at_its_own_times_is_looked_for_anew() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import pamrs
@@ -24,7 +23,7 @@ from pamrs.diagnosis.prepare import available_blocks
 from pamrs.diagnosis.search._hypotheses import _split_by_names
 from pamrs.effects import UNLISTED, Hypothesis
 from pamrs.simulation import core_rig
-from tests.diagnosis.likelihoods import leaving
+from tests.diagnosis.likelihoods import made_up
 from tests.diagnosis.terms import terms
 
 SETTINGS = DiagnosisSettings()
@@ -33,50 +32,33 @@ RIG = pamrs.rigs.shoulder()
 CHANNELS = ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")
 BLOCKS = [b for b in available_blocks(RIG, CHANNELS) if b.kind != "arm"]
 WEIGHING = Weighing(0.985, 30.0, SETTINGS)
-TRIAL = Attempts(
-    Problem(BLOCKS, [], core_rig(RIG), SETTINGS),
-    Problem(BLOCKS, [], core_rig(RIG), SETTINGS),
-    RIG,
-    {},
-    {},
-    BLOCKS,
-)
+PROBLEM = Problem(BLOCKS, [], core_rig(RIG), SETTINGS)
+TRIAL = Attempts(PROBLEM, PROBLEM, RIG, {}, {}, BLOCKS)
 
 
 def candidate(key: str, supply: float, chamber: float, **values: float) -> Candidate:
     """A made-up hypothesis that leaves these excess variances."""
-    own = Hypothesis.parse(key).terms
-    effects = tuple(term for term in own if term.is_effect)
-    wrong = tuple(term.id for term in own if term.is_value)
     model = RIG
-    for effect in effects:
-        model = model.with_effect(effect.id)
-    fit = Fit(
-        effects,
-        model,
-        values,
-        dict.fromkeys(values, 1e-12),
-        np.zeros((len(values), len(values))),
-        0.0,
-        {},
-        dict.fromkeys(wrong, 8.0),
-        scales={name: 0.1 * abs(value) for name, value in values.items()},
-        freed=wrong,
-    )
+    for term in Hypothesis.parse(key).terms:
+        model = model.with_effect(term.id) if term.is_effect else model
     left = {
         name: Excess(1.0 + ratio, ratio**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
         for name, ratio in (("supply", supply), ("chamber", chamber))
     }
-    return Candidate(effects, fit, left, left, 0.0, wrong=wrong, likelihood=leaving(left))
+    known = {
+        "std": dict.fromkeys(values, 1e-12),
+        "moved": {name: 8.0 for name in values if name == key},
+        "scales": {name: 0.1 * abs(value) for name, value in values.items()},
+    }
+    return made_up(model, key, left, values, **known)
 
 
 def group(*found: Candidate) -> BlockGroup:
     start = candidate("", 2.5, 64.0)
-    probabilities = weigh([start, *found], BLOCKS, Weighing(0.985, 30.0, SETTINGS))
+    every = [start, *found]
+    probabilities = weigh(every, BLOCKS, WEIGHING)
     chamber = next(b for b in BLOCKS if b.name == "chamber")
-    return BlockGroup(
-        BLOCKS, start.fitted, start.fitted, [start, *found], probabilities, chamber, {}, BLOCKS
-    )
+    return BlockGroup(BLOCKS, start.fitted, start.fitted, every, probabilities, chamber, {}, BLOCKS)
 
 
 def leak(supply: float, chamber: float) -> Candidate:
@@ -90,10 +72,7 @@ def test_a_leak_of_the_tank_is_named_beside_a_chamber_without_a_name() -> None:
     )
     assert whole.probabilities[UNLISTED] > 0.8
     tank, chamber = _split_by_names(whole, TRIAL, WEIGHING)
-    assert ([b.name for b in tank.blocks], [b.name for b in chamber.blocks]) == (
-        ["supply"],
-        ["chamber"],
-    )
+    assert [[b.name for b in part.blocks] for part in (tank, chamber)] == [["supply"], ["chamber"]]
     judged = judge([tank, chamber], SETTINGS)
     assert [(j.verdict, j.named) for j in judged] == [
         ("effects", terms("supply_leak")),
@@ -125,8 +104,5 @@ def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) 
     parts = _split_by_names(group(volume, heat), TRIAL, WEIGHING)
     assert asked == [["heat_transfer", "supply.volume"]]
     judged = judge(parts, SETTINGS)
-    assert {str(term) for j in judged for term in j.added} == {
-        "supply.volume",
-        "heat_transfer",
-    }
+    assert {str(t) for j in judged for t in j.added} == {"supply.volume", "heat_transfer"}
     assert sorted(b.name for p in parts for b in p.blocks) == ["chamber", "supply"]

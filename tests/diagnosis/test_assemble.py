@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import BlockGroup, Candidate, judge
 from pamrs.diagnosis.explain import _words as words
-from pamrs.diagnosis.fit import Problem, fit, residuals
+from pamrs.diagnosis.fit import fit, residuals
 from pamrs.diagnosis.model._conclude import _merged, _settled
-from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.screen import tangent_of
 from pamrs.effects import UNDECIDED
 from pamrs.errors import DiagnosisError
@@ -24,13 +22,13 @@ from pamrs.experiments import library
 from pamrs.findings import ChannelError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
-from pamrs.simulation import core_rig
+from tests.diagnosis.asked import SETTINGS, diagnosed, problem_of
 from tests.diagnosis.healthy import healthy_case
-from tests.diagnosis.noisy import whole
+from tests.diagnosis.held import held
+from tests.diagnosis.noisy import SHOULDER, driven, without
 from tests.diagnosis.terms import terms
 
-SETTINGS = DiagnosisSettings()
-
+RIG = pamrs.rigs.shoulder()
 NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 
 
@@ -38,33 +36,16 @@ def recorded(
     rig: pamrs.Rig, name: str, role: str, *, leave_out: str = "", seed: int = 1
 ) -> Recording:
     """Six seconds of a shoulder at 200 Hz, with the noise of transducers."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 6.0, 0.005)
-    command = (
-        5.0 + 0.4 * np.sin(2 * np.pi * 0.2 * time + seed) + 0.2 * np.sin(2 * np.pi * 0.7 * time)
-    )
-    run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
-    noise = {
-        "valve_command": 0.0,
-        "supply_pressure": 400.0,
-        "muscle_pressure": 400.0,
-        "joint_angle": 3e-4,
-    }
-    values = {"valve_command": command, **{n: run[n] for n in NAMES[1:]}}
-    channels = {
-        n: values[n] + noise[n] * rng.standard_normal(time.size) for n in NAMES if n != leave_out
-    }
-    return whole(name, role, 0.005, channels)
+    turn = 2 * np.pi * np.arange(0.0, 6.0, 0.005)
+    command = {"valve_command": 5.0 + 0.4 * np.sin(0.2 * turn + seed) + 0.2 * np.sin(0.7 * turn)}
+    one = driven(rig, name, role, 0.005, command, {"valve_command": 0.0, **SHOULDER}, [seed])
+    return without(one, leave_out)
 
 
 @pytest.mark.slow
 def test_an_effect_of_two_blocks_is_named_once() -> None:
-    rig = pamrs.rigs.shoulder()
-    late = rig.with_effect("pressure_lag", {"time_constant": 0.02})
-    records = [
-        recorded(late, f"r{k}", role, seed=k) for k, role in enumerate(("fit", "fit", "held_out"))
-    ]
-    found = pamrs.diagnose(pamrs.Case("late", rig, records, Path()))
+    late = RIG.with_effect("pressure_lag", {"time_constant": 0.02})
+    found = diagnosed(RIG, lambda role, k: recorded(late, f"r{k}", role, seed=k))
     assert found.verdict == "effects"
     assert [e["id"] for e in found.effects if e["probability"] > 0.5] == ["pressure_lag"]
     assert found.text.count("pressure_lag") >= 1
@@ -79,13 +60,13 @@ def test_an_effect_of_two_blocks_is_named_once() -> None:
 
 
 def test_recordings_may_have_other_channels() -> None:
-    rig = pamrs.rigs.shoulder()
-    heavy = rig.with_effect("muscle_creep", {"stiffness": 800.0, "time_constant": 2.0})
-    records = [
-        recorded(heavy, "all", "fit"),
-        recorded(heavy, "some", "fit", leave_out="supply_pressure", seed=2),
-    ]
-    found = pamrs.diagnose(pamrs.Case("unequal", rig, records, Path()))
+    heavy = RIG.with_effect("muscle_creep", {"stiffness": 800.0, "time_constant": 2.0})
+    lacking = ("", "supply_pressure")
+
+    def one(role: str, k: int) -> Recording:
+        return recorded(heavy, f"r{k}", role, leave_out=lacking[k], seed=k + 1)
+
+    found = diagnosed(RIG, one, ("fit", "fit"))
     assert found.where["block"] == "arm"
 
 
@@ -98,15 +79,7 @@ def test_a_rig_without_tolerances_can_be_diagnosed() -> None:
         )
     )
     assert all(p.tol == 0.0 for p in bare.parameters.values() if p.known)
-    run = pamrs.simulate(
-        bare.with_effect("leak_muscle", {"conductance": 3e-11}),
-        duration=60.0,
-        sample_time=0.1,
-        initial={"muscle_pressure": 7e5},
-    )
-    pressure = run["muscle_pressure"] + np.random.default_rng(3).normal(0.0, 150.0, run.time.size)
-    hold = whole("hold", "fit", 0.1, {"muscle_pressure": pressure})
-    found = pamrs.diagnose(pamrs.Case("bare", bare, [hold], Path()))
+    found = pamrs.diagnose(held(3e-11, 60.0, seed=3).with_rig(bare))
     assert found.effects[0]["id"] == "leak_muscle"
 
 
@@ -119,55 +92,45 @@ def test_experiments_are_refused_for_rigs_that_nobody_could_command(name: str) -
 
 
 def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> None:
-    rig = pamrs.rigs.shoulder()
-    true = rig.with_parameters({"sensors.pressure_zero": 800.0, "chamber.alpha": 1.25})
-    prepared = prepare(recorded(true, "all", "fit"), rig, SETTINGS)
-    blocks = {b.name: b for b in available_blocks(rig, NAMES)}
-    chamber = Problem([blocks["chamber"]], [prepared], core_rig(rig), SETTINGS)
+    true = RIG.with_parameters({"sensors.pressure_zero": 800.0, "chamber.alpha": 1.25})
+    chamber, arm = (problem_of(RIG, [recorded(true, "all", "fit")], n) for n in ("chamber", "arm"))
     # as if its own data had said another zero
-    moved = fit(chamber, rig, (), {}, {"chamber": 1.0}, settled={"sensors.pressure_zero": -2500.0})
+    moved = fit(chamber, RIG, (), {}, {"chamber": 1.0}, settled={"sensors.pressure_zero": -2500.0})
     values, tolerances = (
         {**found, "sensors.pressure_zero": zero}
         for found, zero in ((moved.values, -2500.0), (moved.moved, -2.5))
     )
     first = replace(moved, values=values, moved=tolerances)
-    last = fit(
-        Problem([blocks["arm"]], [prepared], core_rig(rig), SETTINGS), rig, (), {}, {"arm": 1.0}
-    )
+    last = fit(arm, RIG, (), {}, {"arm": 1.0})
     candidates = [Candidate((), found, {}, {}, 0.0) for found in (first, last)]
     groups = [
-        BlockGroup([blocks[n]], {}, {}, [c], {UNDECIDED: 1.0}, None, {}, [])
-        for n, c in zip(("chamber", "arm"), candidates, strict=True)
+        BlockGroup(own.blocks, {}, {}, [c], {UNDECIDED: 1.0}, None, {}, [])
+        for own, c in zip((chamber, arm), candidates, strict=True)
     ]
     judged = judge(groups, SETTINGS)
-    settled = _settled(rig, chamber, judged, candidates)
+    settled = _settled(RIG, chamber, judged, candidates)
     assert settled[1] is candidates[1]
-    model = _merged(rig, settled)
+    model = _merged(RIG, settled)
     assert model.parameter("sensors.pressure_zero").value == last.values["sensors.pressure_zero"]
 
     def missed(model: pamrs.Rig) -> float:
         found = residuals(chamber, model)["chamber", "all"]
         return float(np.sqrt(np.mean(found.value[found.rows] ** 2)))
 
-    assert missed(model) < missed(_merged(rig, candidates))
+    assert missed(model) < missed(_merged(RIG, candidates))
     assert missed(model) < 1.02 * missed(true)
 
 
 def test_pressures_that_begin_at_one_atmosphere_are_asked_about() -> None:
-    rig = pamrs.rigs.shoulder()
-    gauge = recorded(rig, "all", "fit")
+    gauge = recorded(RIG, "all", "fit")
     pressure = gauge.channels["muscle_pressure"] - gauge.channels["muscle_pressure"][0]
-    cases = [
-        pamrs.Case(
-            "c",
-            rig,
-            [replace(gauge, channels=gauge.channels | {"muscle_pressure": pressure + zero})],
-            Path(),
-        )
-        for zero in (0.0, 101325.0)
-    ]
-    assert words.absolute(cases[0]) == []
-    (told,) = words.absolute(cases[1])
+
+    def said(zero: float) -> list[str]:
+        channels = gauge.channels | {"muscle_pressure": pressure + zero}
+        return words.absolute(pamrs.Case("c", RIG, [replace(gauge, channels=channels)], Path()))
+
+    assert said(0.0) == []
+    (told,) = said(101325.0)
     assert "absolute pressures" in told
 
 
@@ -184,11 +147,8 @@ def test_a_channel_that_a_new_model_spoils_is_told() -> None:
 
 
 def test_parameters_that_are_all_at_their_walls_explain_nothing() -> None:
-    rig = pamrs.rigs.shoulder()
-    prepared = prepare(recorded(rig, "all", "fit"), rig, SETTINGS)
-    blocks = {b.name: b for b in available_blocks(rig, NAMES)}
-    arm = Problem([blocks["arm"]], [prepared], core_rig(rig), SETTINGS)
-    found = fit(arm, rig, (), {}, {"arm": 1.0})
+    arm = problem_of(RIG, [recorded(RIG, "all", "fit")], "arm")
+    found = fit(arm, RIG, (), {}, {"arm": 1.0})
     walls = SETTINGS.most_tolerances
     stuck = replace(found, moved=dict.fromkeys(found.moved, walls))
     free, held = (tangent_of(one, arm, {"arm": 1.0}) for one in (found, stuck))

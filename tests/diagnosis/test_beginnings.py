@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.next_experiment._choice import Outcome, outcome_of
 from pamrs.diagnosis.next_experiment._differences import counted
 from pamrs.diagnosis.prepare import (
@@ -23,13 +20,14 @@ from pamrs.diagnosis.prepare import (
 )
 from pamrs.errors import PamrsError
 from pamrs.experiments import Experiment
+from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig
-from tests.diagnosis.noisy import noisy
-from tests.diagnosis.test_regulator import TEXT
+from tests.diagnosis.asked import SETTINGS, diagnosed, problem_of
+from tests.diagnosis.noisy import GAUGES, driven
+from tests.diagnosis.stands import LIMITED
 
-SETTINGS = DiagnosisSettings()
-RIG = parse_rig(TEXT)
+RIG = parse_rig(LIMITED)
 DT = 0.005
 FILLING = 3e5 + 2e5 * np.sin(2.0 * np.arange(0.0, 6.0, DT))
 
@@ -39,10 +37,9 @@ def made(
 ) -> tuple[Block, Prepared]:
     """The chamber of a log that begins with these pressures, the outlet having no gauge."""
     start = {"supply_pressure": outlet, "muscle_pressure": chamber}
-    run = pamrs.simulate(rig, supply_command=command, sample_time=DT, initial=start)
-    channels = {"supply_command": command, "muscle_pressure": run["muscle_pressure"]}
-    one = noisy("lift", "fit", DT, channels, {"muscle_pressure": 400.0}, [seed])
-    (block,) = available_blocks(rig, tuple(channels))
+    given, noise = {"supply_command": command}, {"muscle_pressure": 400.0}
+    one = driven(rig, "lift", "fit", DT, given, noise, [seed], initial=start)
+    (block,) = available_blocks(rig, tuple(one.channels))
     return block, prepare(one, rig, SETTINGS)
 
 
@@ -71,13 +68,9 @@ def test_a_log_that_begins_at_rest_loses_nothing() -> None:
 
 
 def test_a_supply_with_a_gauge_begins_where_it_was_measured() -> None:
-    run = pamrs.simulate(RIG, supply_command=FILLING, sample_time=DT)
-    channels = {"supply_command": FILLING}
-    channels |= {n: run[n] for n in ("supply_pressure", "muscle_pressure")}
-    noise = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
-    one = noisy("lift", "fit", DT, channels, noise, [3])
-    blocks = available_blocks(RIG, tuple(channels))
-    assert begun_alike(blocks, core_rig(RIG), prepare(one, RIG, SETTINGS)).unsettled == {}
+    one = driven(RIG, "lift", "fit", DT, {"supply_command": FILLING}, GAUGES, [3])
+    problem = problem_of(RIG, [one])
+    assert begun_alike(problem.blocks, problem.core, problem.recordings[0]).unsettled == {}
 
 
 def test_outlets_are_those_of_supplies_and_above_a_vacuum() -> None:
@@ -91,12 +84,12 @@ def test_outlets_are_those_of_supplies_and_above_a_vacuum() -> None:
 
 
 def test_a_diagnosis_says_what_it_did_not_judge() -> None:
-    recordings = []
-    for seed, role in enumerate(("fit", "fit", "held_out")):
+    def lift(role: str, seed: int) -> Recording:
         command = FILLING + 1e5 * np.sin(3.1 * seed + 7.0 * np.arange(0.0, 6.0, DT))
         _, prepared = made(RIG, command, float(command[0]), 0.0, seed)
-        recordings.append(replace(prepared.recording, name=f"r{seed}", role=role))
-    found = pamrs.diagnose(pamrs.Case("lifts", RIG, recordings, Path()))
+        return replace(prepared.recording, name=f"r{seed}", role=role)
+
+    found = diagnosed(RIG, lift)
     assert found.verdict == "none"
     (told,) = (text for text in found.warnings if "were not judged" in text)
     assert "block chamber: the first 0." in told
@@ -108,21 +101,13 @@ def test_a_diagnosis_says_what_it_did_not_judge() -> None:
 def fills(duration: float, *channels: str) -> Outcome:
     """What a set pressure that begins far above the chamber would tell of two time constants."""
     command = np.full(round(duration / DT), 4e5)
-    done = Experiment(
-        "fill",
-        "open the stopcock",
-        {"kind": "fill"},
-        command,
-        command.size,
-        DT,
-        {"supply_pressure": 4e5, "muscle_pressure": 0.0},
-        channel="supply_command",
-    )
-    nominal = parse_rig(TEXT.replace(", tol = 0.01 }", " }", 1))  # of the time constant
+    start = {"supply_pressure": 4e5, "muscle_pressure": 0.0}
+    given = ("fill", "open the stopcock", {"kind": "fill"}, command, command.size, DT, start)
+    done = Experiment(*given, channel="supply_command")
+    nominal = parse_rig(LIMITED.replace(", tol = 0.01 }", " }", 1))  # of the time constant
     slow = nominal.with_parameters({"supply.time_constant": 0.2})
     hypotheses = [("none", nominal, 0.5), ("supply.time_constant", slow, 0.5)]
-    sound = {"muscle_pressure": 400.0, "supply_pressure": 400.0}
-    return outcome_of(done, hypotheses, sound, ("supply_command", *channels), SETTINGS)
+    return outcome_of(done, hypotheses, GAUGES, ("supply_command", *channels), SETTINGS)
 
 
 def test_an_experiment_tells_nothing_by_samples_that_are_not_judged() -> None:

@@ -5,6 +5,7 @@ what some channels could tell of them before anything is recorded.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,6 @@ import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment import measurable, propose
@@ -38,47 +38,36 @@ from pamrs.recordings import Recording, load_recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig, replay
 from tests.diagnosis import synthetic
+from tests.diagnosis.asked import SETTINGS
 from tests.diagnosis.noisy import whole
 from tests.simulation.test_spools import PAIR
+from tests.tables import text_of
 
-SETTINGS = DiagnosisSettings()
-OWN = SETTINGS
 JOINT = pamrs.rigs.antagonistic_joint()
 TWO = pamrs.rigs.named("two_joint_arm")
 REGULATED = pamrs.rigs.named("regulated_joint")
 PULSED = parse_rig(PAIR)
 SIDES = ("flexor", "extensor")
-REGULATORS = """
-schema = "pamrs.rig/1"
-name = "two_regulators"
-[gas]
-[limits]
-max_pressure = { value = 4, unit = "bar" }
-""" + "".join(
-    f"""
-[supply.{side}]
-kind             = "regulator"
-initial_pressure = {{ value = 1, unit = "bar" }}
-time_constant    = {{ value = 0.1, unit = "s", tol = 0.02 }}
-[line.{side}]
-kind     = "tube"
-from     = "supply.{side}"
-to       = "chamber.{side}"
-length   = {{ value = 2, unit = "m", tol = 0.05 }}
-diameter = {{ value = 4, unit = "mm", tol = 0.05 }}
-[chamber.{side}]
-dead_volume      = {{ value = 0.3, unit = "l", tol = 0.01 }}
-initial_pressure = {{ value = 1, unit = "bar" }}
-alpha_in  = {{ value = 1.3, unit = "1" }}
-alpha_out = {{ value = 1.1, unit = "1" }}
-alpha     = {{ value = 1.2, unit = "1" }}
-"""
-    for side in ("left", "right")
-)
+REGULATORS = text_of(__file__, "two_regulators")
 
 
 def only(rig: Rig, *names: str, **options) -> list[Experiment]:
-    return library(rig, OWN, sample_time=0.01, only=names, **options)
+    return library(rig, SETTINGS, sample_time=0.01, only=names, **options)
+
+
+def to_four_bar(rig: Rig, more: str = "") -> Rig:
+    """A rig whose file allows so much, and maybe more."""
+    own = rig.to_toml_text().partition("\n[limits]")[0]
+    limits = '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'
+    return parse_rig(own + limits + more)
+
+
+def asked_of(rig: Rig, kind: str = "") -> dict[str, str]:
+    """The experiment that each block of a kind, or of any, is asked by."""
+    blocks = available_blocks(rig, measurable(rig))
+    asked = _Question(rig, [], blocks, [], Problem(blocks, [], core_rig(rig), SETTINGS))
+    made = {b.name: asked.experiment(b)[2] for b in blocks if b.kind == kind or not kind}
+    return {name: experiment.name for name, experiment in made.items() if experiment is not None}
 
 
 def test_a_chain_is_a_chamber_with_its_valves_or_a_regulator_with_what_it_fills() -> None:
@@ -118,14 +107,10 @@ def test_pressures_follow_references_of_their_own() -> None:
 
 @pytest.mark.parametrize("carrier", [True, False], ids=["duty", "on or off"])
 def test_valves_that_switch_hold_a_pressure(carrier: bool) -> None:
-    rig = PULSED
-    if not carrier:
-        rig = rig.with_parameters(
-            {f"valve.{name}.carrier_frequency": 0.0 for name in ("fill", "vent")}
-        )
-    reference = np.interp(
-        0.01 * np.arange(901), [0.0, 1.0, 4.0, 5.0, 9.0], [2e5, 3e5, 3e5, 1e5, 1e5]
-    )
+    off = {f"valve.{name}.carrier_frequency": 0.0 for name in ("fill", "vent")}
+    rig = PULSED if carrier else PULSED.with_parameters(off)
+    levels = ([0.0, 1.0, 4.0, 5.0, 9.0], [2e5, 3e5, 3e5, 1e5, 1e5])
+    reference = np.interp(0.01 * np.arange(901), *levels)
     sent = commands_for(rig, {"": reference}, sample_time=0.01)
     found = pamrs.simulate(rig, sample_time=0.01, **driving(sent))["muscle_pressure"]
     for begin, level in ((250, 3e5), (700, 1e5)):
@@ -156,9 +141,7 @@ def test_every_chain_has_an_order_of_its_own(count: int) -> None:
 
 
 def test_what_cannot_be_shut_gets_no_holds() -> None:
-    three = PULSED.to_toml_text().replace('with_current        = "fill"', 'with_current = "fill"')
-    text = three.replace('without_current     = "closed"', 'without_current = "vent"')
-    rig = parse_rig(text.replace('without_current   = "closed"', 'without_current = "vent"'))
+    rig = parse_rig(re.sub(r'(without_current *=) "closed"', r'\1 "vent"', PULSED.to_toml_text()))
     (chain,) = chains_of(rig)
     assert not can_shut(rig, chain)
     names = {e.name for e in only(rig, "sealed_hold", "step_and_shut", "set_steps", "null_ramp")}
@@ -201,12 +184,8 @@ def test_all_chains_move_at_once_and_none_as_another() -> None:
     "rig", [pytest.param(JOINT, marks=pytest.mark.slow), TWO], ids=["one joint", "two joints"]
 )
 def test_experiments_keep_to_what_rig_and_recordings_allow(rig: Rig) -> None:
-    text = (
-        rig.to_toml_text().partition("\n[limits]")[0]
-        + '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'
-    )
-    limited = parse_rig(text + 'payloads = { value = [0.1, 0.9], unit = "kg" }\n')
-    pool = library(limited, OWN, sample_time=0.01)
+    limited = to_four_bar(rig, 'payloads = { value = [0.1, 0.9], unit = "kg" }\n')
+    pool = library(limited, SETTINGS, sample_time=0.01)
     assert {e.kind for e in pool} >= {"multisine", "slow_triangle", "other_payload", "staircase"}
     valves = limited.tables("valve")
     for experiment in pool:
@@ -227,14 +206,13 @@ def recording(peaks: dict[str, float]) -> Recording:
 
 def test_each_chain_stays_inside_its_own_recorded_pressures() -> None:
     peaks = {"muscle_pressure.flexor": 4e5, "muscle_pressure.extensor": 3e5}
-    (waves,) = experiments_of(JOINT, [recording(peaks)], OWN, {"multisine"})
+    (waves,) = experiments_of(JOINT, [recording(peaks)], SETTINGS, {"multisine"})
     run = waves.simulate(JOINT)
     for name, peak in peaks.items():
         assert run[name].max() <= 1.06 * peak
     # without a gauge it goes no higher than what has one
-    (waves,) = experiments_of(
-        JOINT, [recording({"muscle_pressure.flexor": 3e5})], OWN, {"multisine"}
-    )
+    alone = recording({"muscle_pressure.flexor": 3e5})
+    (waves,) = experiments_of(JOINT, [alone], SETTINGS, {"multisine"})
     assert waves.simulate(JOINT)["muscle_pressure.extensor"].max() <= 1.06 * 3e5
 
 
@@ -243,15 +221,14 @@ def test_what_was_recorded_without_pressure_is_not_filled(flexor: float) -> None
     peaks = {"muscle_pressure.flexor": flexor, "muscle_pressure.extensor": 0.19e5}
     # muscles that push: a slack pair swings, and squeezes the air in one of no pressure
     joint = JOINT.with_parameters({f"muscle.{side}.buckling_load": 1e9 for side in SIDES})
-    (waves,) = experiments_of(joint, [recording(peaks)], OWN, {"multisine"})
+    (waves,) = experiments_of(joint, [recording(peaks)], SETTINGS, {"multisine"})
     run = waves.simulate(joint)
     late = run.time > 5.0  # the rig begins at 2 bar
     for name, peak in peaks.items():
         assert run[name][late].max() <= 1.06 * max(peak, _LEAST_HIGHEST)
     # what has no gauge is no higher than what has one, and what has one was not filled
-    (waves,) = experiments_of(
-        JOINT, [recording({"muscle_pressure.flexor": flexor})], OWN, {"multisine"}
-    )
+    alone = recording({"muscle_pressure.flexor": flexor})
+    (waves,) = experiments_of(JOINT, [alone], SETTINGS, {"multisine"})
     top = 1.06 * max(flexor, _LEAST_HIGHEST)
     assert waves.simulate(JOINT)["muscle_pressure.extensor"][late].max() <= top
 
@@ -284,7 +261,7 @@ def test_the_file_of_an_experiment_is_played_by_its_rig(
 def test_what_lines_join_is_filled_one_by_one() -> None:
     for name in ("tube", "long_tube"):
         rig = pamrs.rigs.named(name)
-        pool = library(rig, OWN)
+        pool = library(rig, SETTINGS)
         over = [e for e in pool if e.kind == "blow_over"]
         assert [e.name for e in over] == ["blow_over.left", "blow_over.right"]
         for experiment in over:
@@ -295,12 +272,9 @@ def test_what_lines_join_is_filled_one_by_one() -> None:
 
 
 def test_a_question_about_a_chamber_moves_its_own_chain() -> None:
-    blocks = available_blocks(JOINT, measurable(JOINT))
-    problem = Problem(blocks, [], core_rig(JOINT), SETTINGS)
-    asked = _Question(JOINT, [], blocks, [], problem)
-    kinds = {b.name: asked.experiment(b)[2] for b in blocks if b.name != "chamber.flexor"}
-    assert {name: e.name for name, e in kinds.items() if e is not None} == {
+    assert asked_of(JOINT) == {
         "supply": "sealed_hold",
+        "chamber.flexor": "step_and_shut.flexor",
         "chamber.extensor": "step_and_shut.extensor",
         "arm.elbow": "nested_triangles.flexor",
     }
@@ -323,10 +297,7 @@ closing_delay   = { value = 0, unit = "ms" }
 
 def test_a_question_never_moves_another_chain_than_the_block_s_own() -> None:
     assert [can_shut(MIXED, chain) for chain in chains_of(MIXED)] == [False, True]
-    blocks = available_blocks(MIXED, measurable(MIXED))
-    asked = _Question(MIXED, [], blocks, [], Problem(blocks, [], core_rig(MIXED), SETTINGS))
-    made = {b.name: asked.experiment(b)[2] for b in blocks if b.kind == "chamber"}
-    assert {name: e.name for name, e in made.items() if e is not None} == {
+    assert asked_of(MIXED, "chamber") == {
         "chamber.flexor": "set_steps.flexor",
         "chamber.extensor": "step_and_shut.extensor",
     }
@@ -338,18 +309,15 @@ def chamber(name: str) -> str:
     return f"[chamber.{name}]{table.partition('[')[0]}"
 
 
+HOLDS = {"hold_low", "hold_high", "hold_short", "hold_long"}
+"""All that can be done with chambers that nothing drives."""
 UNJOINED = 'schema = "pamrs.rig/1"\nname = "unjoined"\n[gas]\n' + chamber("left") + chamber("right")
 
 
 def test_only_what_lines_join_blows_over() -> None:
     rig = parse_rig(UNJOINED)
     assert chains_of(rig) == []
-    assert {e.name for e in library(rig, OWN)} == {
-        "hold_low",
-        "hold_high",
-        "hold_short",
-        "hold_long",
-    }
+    assert {e.name for e in library(rig, SETTINGS)} == HOLDS
     blocks = available_blocks(rig, measurable(rig))
     assert {_telling(block, rig).kind for block in blocks} == {"hold_low"}
     line = """
@@ -361,13 +329,10 @@ length   = { value = 2, unit = "m", tol = 0.05 }
 diameter = { value = 4, unit = "mm", tol = 0.05 }
 """
     rig = parse_rig(UNJOINED + chamber("third") + line)
-    over = {e.name: e for e in library(rig, OWN) if e.kind == "blow_over"}
+    over = {e.name: e for e in library(rig, SETTINGS) if e.kind == "blow_over"}
     assert list(over) == ["blow_over.left", "blow_over.right"]
     assert over["blow_over.left"].duration < 30.0  # not as long as the third one stays apart
-    blocks = available_blocks(rig, measurable(rig))
-    asked = _Question(rig, [], blocks, [], Problem(blocks, [], core_rig(rig), SETTINGS))
-    made = {b.name: asked.experiment(b)[2] for b in blocks if b.kind == "chamber"}
-    assert {name: e.name for name, e in made.items() if e is not None} == {
+    assert asked_of(rig, "chamber") == {
         "chamber.left": "blow_over.left",
         "chamber.right": "blow_over.right",
         "chamber.third": "hold_low",
@@ -376,13 +341,12 @@ diameter = { value = 4, unit = "mm", tol = 0.05 }
 
 def test_pressures_that_cannot_be_found_are_told_in_words(monkeypatch) -> None:
     sealed = pamrs.rigs.sealed_chamber()
-    assert library(sealed, OWN, highest={})[0].name == "hold_low"
+    assert library(sealed, SETTINGS, highest={})[0].name == "hold_low"
     with pytest.raises(DiagnosisError, match="has the chains flexor, extensor; the pressures of a"):
         pressure_range(JOINT)
-    with pytest.raises(
-        ParameterError, match=r"highest has 'flexr', .* one of 'flexor', 'extensor'"
-    ):
-        library(JOINT, OWN, highest={"flexr": 2e5})
+    words = r"highest has 'flexr', .* one of 'flexor', 'extensor'"
+    with pytest.raises(ParameterError, match=words):
+        library(JOINT, SETTINGS, highest={"flexr": 2e5})
 
     def fails(*args: object, **options: object) -> None:
         raise SimulationError("the gas leaves its range")
@@ -391,25 +355,19 @@ def test_pressures_that_cannot_be_found_are_told_in_words(monkeypatch) -> None:
         patched.setattr("pamrs.experiments._chains.simulate", fails)
         for rig in (JOINT, pamrs.rigs.shoulder()):
             with pytest.raises(DiagnosisError, match="while its pressures rise.*leaves its range"):
-                library(rig, OWN)
+                library(rig, SETTINGS)
     # an experiment that a model does not survive is left out, whoever simulates it
     with monkeypatch.context() as patched:
         patched.setattr("pamrs.experiments._protocols.simulate", fails)
-        left = {e.kind for e in library(pamrs.rigs.named("tube"), OWN)}
-        assert left == {"hold_low", "hold_high", "hold_short", "hold_long"}
-    text = (
-        JOINT.to_toml_text().partition("\n[limits]")[0]
-        + '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'
-    )
+        left = {e.kind for e in library(pamrs.rigs.named("tube"), SETTINGS)}
+        assert left == HOLDS
     monkeypatch.setattr(Experiment, "simulate", fails)
-    assert only(parse_rig(text), "multisine") == []
+    assert only(to_four_bar(JOINT), "multisine") == []
 
 
 def test_a_noise_of_a_kind_is_that_of_all_its_channels() -> None:
-    hypotheses = [
-        ("none", JOINT, 0.5),
-        ("leak_muscle", JOINT.with_effect("leak_muscle", {"conductance": 2e-12}, at="flexor"), 0.5),
-    ]
+    leak = JOINT.with_effect("leak_muscle", {"conductance": 2e-12}, at="flexor")
+    hypotheses = [("none", JOINT, 0.5), ("leak_muscle", leak, 0.5)]
     pool = only(JOINT, "multisine")
     every = {f"muscle_pressure.{side}": 5e3 for side in SIDES}
 
@@ -430,22 +388,16 @@ def planned(monkeypatch: pytest.MonkeyPatch, rig: Rig, kinds: tuple[str, ...], *
 
 
 def test_a_plan_tells_a_leak_at_one_muscle_from_one_at_the_other(monkeypatch) -> None:
-    made = planned(
-        monkeypatch, JOINT, ("sealed_hold", "step_and_shut"), "leak_muscle", "valve_dead_zone"
-    )
+    effects = ("leak_muscle", "valve_dead_zone")
+    made = planned(monkeypatch, JOINT, ("sealed_hold", "step_and_shut"), *effects)
     found = made()
-    assert set(found.seen) == {
-        f"{effect}@{side}" for effect in ("valve_dead_zone", "leak_muscle") for side in SIDES
-    }
+    assert set(found.seen) == {f"{effect}@{side}" for effect in effects for side in SIDES}
     for side in SIDES:
         assert found.sight(f"leak_muscle@{side}").block == f"chamber.{side}"
         assert found.separable(f"leak_muscle@{side}", f"valve_dead_zone@{side}")
     assert found.separable("leak_muscle@flexor", "leak_muscle@extensor")
-    assert [e["name"] for e in found.experiments] == [
-        "sealed_hold",
-        "step_and_shut.flexor",
-        "step_and_shut.extensor",
-    ]
+    names = ["sealed_hold", *(f"step_and_shut.{side}" for side in SIDES)]
+    assert [e["name"] for e in found.experiments] == names
     written = json.loads(json.dumps(found.to_dict()))["effects"]
     assert {(e["id"], e["at"]) for e in written} >= {("leak_muscle", s) for s in SIDES}
     assert "leak_muscle@extensor" in found.text()
@@ -480,25 +432,17 @@ def test_names_without_a_block_stand_for_all_of_a_kind(monkeypatch) -> None:
 
 
 def test_effects_of_a_time_or_of_the_last_joint_are_planned_as_they_can_be(monkeypatch) -> None:
-    made = planned(
-        monkeypatch, JOINT, ("slow_triangle.flexor",), "payload_change", "external_torque"
-    )
-    found = made()
-    assert set(found.seen) == {"payload_change", "external_torque"}
+    effects = ("payload_change", "external_torque")
+    found = planned(monkeypatch, JOINT, ("slow_triangle.flexor",), *effects)()
+    assert set(found.seen) == set(effects)
     # no more than is there can be taken away
     payload = JOINT.parameter("arm.payload").value
     assert found.sight("payload_change").typical <= payload
 
 
 def test_a_regulated_joint_is_planned(monkeypatch) -> None:
-    made = planned(
-        monkeypatch,
-        REGULATED,
-        ("slow_triangle", "set_steps"),
-        "supply_regulator_deadband",
-        "muscle_hysteresis",
-        "leak_muscle",
-    )
+    effects = ("supply_regulator_deadband", "muscle_hysteresis", "leak_muscle")
+    made = planned(monkeypatch, REGULATED, ("slow_triangle", "set_steps"), *effects)
     found = made()
     assert [b["name"] for b in found.blocks] == ["supply", "chamber", "arm"]
     assert set(found.seen) == {"supply_regulator_deadband", "muscle_hysteresis"}
@@ -524,14 +468,9 @@ def test_two_regulators_and_pulsed_valves_are_planned(monkeypatch) -> None:
 
 
 def test_the_place_of_a_leak_is_asked_of_the_muscle_that_may_have_it() -> None:
-    hypotheses = [
-        (
-            f"leak_muscle@{side}",
-            JOINT.with_effect("leak_muscle", {"conductance": 5e-12}, at=side),
-            0.5,
-        )
-        for side in SIDES
-    ]
+    leak = {"conductance": 5e-12}
+    leaking = {side: JOINT.with_effect("leak_muscle", leak, at=side) for side in SIDES}
+    hypotheses = [(f"leak_muscle@{side}", rig, 0.5) for side, rig in leaking.items()]
     pool = only(JOINT, "step_and_shut.flexor")
     found = propose(JOINT, hypotheses, noise_of(JOINT), experiments=pool)
     assert found.expected_information_bits > 0.9

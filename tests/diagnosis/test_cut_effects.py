@@ -49,16 +49,12 @@ def test_a_cut_block_shows_the_effect_that_the_simulation_has(effect: str) -> No
         run = pamrs.simulate(rig, valve_command=_commands(), sample_time=DT, step=1e-4)
     except PamrsError as error:
         pytest.skip(f"the shoulder cannot have it: {error}")
-    for block, channel in (
-        ("supply", "supply_pressure"),
-        ("chamber", "muscle_pressure"),
-        ("arm", "joint_angle"),
-    ):
+    channels = ("supply_pressure", "muscle_pressure", "joint_angle")
+    for block, channel in zip(("supply", "chamber", "arm"), channels, strict=True):
         if (effect, block) in UNTOLD:
             continue
         with_it = np.abs(_predicted(rig, run, block, channel)).max()
         without = np.abs(_predicted(bare, run, block, channel)).max()
         scale = np.ptp(np.asarray(run[channel]))
-        assert with_it < 5e-4 * scale, (
-            f"{block}: {with_it}, without the effect {without}, of {scale}"
-        )
+        told = f"{block}: {with_it}, without the effect {without}, of {scale}"
+        assert with_it < 5e-4 * scale, told

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import (
     at_ambient,
     available_blocks,
@@ -23,11 +22,12 @@ from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig, differences, replay
+from tests.diagnosis.asked import SETTINGS, blocks_of, diagnosed
+from tests.diagnosis.noisy import SHOULDER, driven
 from tests.diagnosis.test_overlap import of, run
 from tests.tables import text_of
 
-SETTINGS = DiagnosisSettings()
-NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+NAMES = ("valve_command", *SHOULDER)
 
 
 def test_means_are_of_their_time_and_free_of_aliases() -> None:
@@ -35,9 +35,8 @@ def test_means_are_of_their_time_and_free_of_aliases() -> None:
     time = dt * np.arange(5000)
     hum = np.sin(2 * np.pi * 200.0 * time)  # would be a constant at every fifth sample
     volts = np.where(time < 2.0015, 5.0, 6.0)
-    fast = of(
-        "fast", "fit", dt, {"muscle_pressure": 1e5 * time + 1e4 * hum, "valve_command": volts}
-    )
+    channels = {"muscle_pressure": 1e5 * time + 1e4 * hum, "valve_command": volts}
+    fast = of("fast", "fit", dt, channels)
     slow = averaged(fast, 5)
     assert slow.sample_time == pytest.approx(0.005)
     assert len(slow) == 999
@@ -67,12 +66,9 @@ def test_a_valve_lets_through_what_its_openings_do_and_not_their_mean() -> None:
     rig, dt = pamrs.rigs.shoulder(), 0.002
     rng = np.random.default_rng(5)
     moves = 5.0 + 0.25 * np.sin(0.02 * np.arange(1000)) + rng.normal(0.0, 0.15, 1000)
-    command = np.repeat(moves, 2)
-    made = pamrs.simulate(rig, valve_command=command, sample_time=dt, step=0.001)
-    fast = of("a", "fit", dt, {"valve_command": command} | {n: made[n] for n in NAMES[1:]})
-    blocks = available_blocks(rig, NAMES)
-    chamber = next(b for b in blocks if b.name == "chamber")
-    core = core_rig(rig)
+    exact, command = dict.fromkeys(SHOULDER, 0.0), {"valve_command": np.repeat(moves, 2)}
+    fast = driven(rig, "a", "fit", dt, command, exact, [0], step=0.001)
+    chamber, core = blocks_of(rig, NAMES)["chamber"], core_rig(rig)
     logged = averaged(fast, 5)
 
     def missed(recording: Recording) -> float:
@@ -93,9 +89,8 @@ def test_only_fast_recordings_are_averaged_and_no_further_than_needed() -> None:
     quick = run(dt=0.001, duration=4.0)
     assert averaged_to_need([quick, one], blocks, "a", few)[1] == [9, 1]
     assert averaged_to_need([quick], blocks, "a", SETTINGS)[1] == [3]  # it is short
-    with pytest.raises(
-        DiagnosisError, match=r"'long': .* 3644 samples .* at most 3500 .* start and"
-    ):
+    words = r"'long': .* 3644 samples .* at most 3500 .* start and"
+    with pytest.raises(DiagnosisError, match=words):
         averaged_to_need([quick, one], blocks, "long", replace(few, most_samples=3500))
     sealed = available_blocks(pamrs.rigs.sealed_chamber(), ("muscle_pressure",))
     assert averaged_to_need([quick], sealed, "a", few)[1] == [99]
@@ -104,19 +99,14 @@ def test_only_fast_recordings_are_averaged_and_no_further_than_needed() -> None:
 def test_channels_without_use_are_told_everywhere() -> None:
     rig = pamrs.rigs.sealed_chamber()
     leaky = rig.with_effect("leak_muscle", {"conductance": 3e-11})
-    made = pamrs.simulate(
-        leaky, duration=60.0, sample_time=0.02, step=0.01, initial={"muscle_pressure": 7e5}
-    )
-    rng = np.random.default_rng(1)
-    size = made.time.size
-    channels = {
-        "muscle_pressure": made["muscle_pressure"] + rng.normal(0.0, 150.0, size),
-        "line_pressure": rng.normal(1e5, 150.0, size),
-        "temperature": rng.normal(293.0, 0.1, size),
-    }
-    hold: Recording = of("hold", "fit", 0.02, channels)
+    given = {"duration": 60.0, "step": 0.01, "initial": {"muscle_pressure": 7e5}}
+    hold = driven(leaky, "hold", "fit", 0.02, {}, {"muscle_pressure": 150.0}, [1], **given)
+    rng = np.random.default_rng(2)
+    useless = {"line_pressure": (1e5, 150.0), "temperature": (293.0, 0.1)}
+    more = {name: rng.normal(*level, len(hold)) for name, level in useless.items()}
     settings = replace(SETTINGS, ample_samples=500)
-    found = pamrs.diagnose(pamrs.Case("hold", rig, [hold], Path()), settings=settings)
+    hold = of("hold", "fit", 0.02, hold.channels | more)
+    found = diagnosed(rig, lambda *_: hold, ("fit",), settings)
     assert [e.id for e in found.effects][:1] == ["leak_muscle"]
     (own,) = json.loads(found.to_json())["data"]
     assert own["used"] == ["muscle_pressure"]
@@ -136,24 +126,19 @@ WARM = 320.0
 NOZZLE = parse_rig(text_of(__file__, "nozzle"))
 
 
-def warm_stand(seed: int, role: str = "fit", room: float = WARM) -> Recording:
+def warm_stand(role: str, seed: int, room: float = WARM) -> Recording:
     """A tank that empties through a nozzle at 320 K, by 4.5 % faster than at 293 K."""
     rig = NOZZLE.with_parameters({"gas.temperature": WARM})
-    start = {"muscle_pressure": 5e5 + 2e4 * seed}
-    made = pamrs.simulate(rig, duration=40.0, sample_time=0.02, step=0.01, initial=start)
-    rng = np.random.default_rng(seed)
-    size = made.time.size
-    channels = {
-        "muscle_pressure": made["muscle_pressure"] + rng.normal(0.0, 150.0, size),
-        "ambient_temperature": np.round(rng.normal(room, 0.1, size), 1),
-    }
-    return of(f"hold{seed}", role, 0.02, channels)
+    start, noise = {"muscle_pressure": 5e5 + 2e4 * seed}, {"muscle_pressure": 150.0}
+    given = {"duration": 40.0, "step": 0.01, "initial": start}
+    made = driven(rig, "", role, 0.02, {}, noise, [seed], **given)
+    air = np.round(np.random.default_rng(seed).normal(room, 0.1, len(made)), 1)
+    return of(f"hold{seed}", role, 0.02, made.channels | {"ambient_temperature": air})
 
 
 def test_a_measured_room_is_that_of_the_rig() -> None:
     """Air of 320 K goes through a nozzle faster than the 293 K of the rig file say."""
-    recordings = [warm_stand(1), warm_stand(2), warm_stand(3, "held_out")]
-    found = pamrs.diagnose(pamrs.Case("warm", NOZZLE, recordings, Path()))
+    found = diagnosed(NOZZLE, warm_stand)
     assert found.verdict == "none"
     (told,) = (text for text in found.warnings if text.startswith("gas.temperature is"))
     assert told.startswith("gas.temperature is 320 K, as ambient_temperature was measured (293")
@@ -191,14 +176,13 @@ def test_temperatures_that_are_told_beside_each_other_differ(room: float, told: 
 
 @pytest.mark.parametrize("room", [210.0, 249.9, 330.1, 390.0, 500.0, 1900.0])
 def test_a_room_that_cannot_be_is_an_error(room: float) -> None:
-    with pytest.raises(
-        DiagnosisError, match=rf"ambient_temperature of hold1 \({room} K\): .* 250 to 330 K are"
-    ):
+    words = rf"ambient_temperature of hold1 \({room} K\): .* 250 to 330 K are"
+    with pytest.raises(DiagnosisError, match=words):
         room_of(293.0, room, 294.0)
 
 
 def test_an_impossible_room_ends_a_diagnosis_unless_it_is_allowed() -> None:
-    hot = pamrs.Case("hot", NOZZLE, [warm_stand(1, room=390.0)], Path())
+    hot = pamrs.Case("hot", NOZZLE, [warm_stand("fit", 1, 390.0)], Path())
     with pytest.raises(DiagnosisError, match=r"hold1 \(390.0 K\): no room has it"):
         pamrs.diagnose(hot)
     wider = replace(SETTINGS, most_room=400.0)
@@ -248,22 +232,13 @@ def test_masked_samples_say_nothing_of_the_room() -> None:
 
 def test_a_recorded_temperature_of_the_gas_is_compared_by_a_replay() -> None:
     """Air that is let out cools; a thermometer that reads 2 K too much shows there."""
-    rig = parse_rig(
-        NOZZLE.to_toml_text()
-        .replace(
-            "[chamber]",
-            '[chamber]\ngas = "energy_balance"\n'
-            'heat_transfer_coefficient = { value = 20.0, unit = "W/(m2 K)" }',
-            1,
-        )
-        .replace("alpha", "# alpha")
-    )
+    gas = 'gas = "energy_balance"'
+    wall = 'heat_transfer_coefficient = { value = 20.0, unit = "W/(m2 K)" }'
+    text = NOZZLE.to_toml_text().replace("alpha", "# alpha")
+    rig = parse_rig(text.replace("[chamber]", f"[chamber]\n{gas}\n{wall}", 1))
     made = pamrs.simulate(rig, duration=20.0, sample_time=0.02, initial={"muscle_pressure": 5e5})
     assert made["temperature"].min() < 289.0
-    channels = {
-        "muscle_pressure": made["muscle_pressure"],
-        "temperature": made["temperature"] + 2.0,
-    }
-    recording = of("hold", "fit", 0.02, channels)
+    pressure, gas = made["muscle_pressure"], made["temperature"] + 2.0
+    recording = of("hold", "fit", 0.02, {"muscle_pressure": pressure, "temperature": gas})
     told = differences(replay(rig, recording), recording)
     assert told["temperature"] == pytest.approx(2.0, rel=0.01)

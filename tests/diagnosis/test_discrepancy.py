@@ -22,23 +22,16 @@ from pamrs.diagnosis.noise import (
     with_sizes,
 )
 from pamrs.diagnosis.noise._discrepancy import _flowing, whitening
-from pamrs.diagnosis.prepare import Residual, available_blocks, binned, prepare
-from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.diagnosis.prepare import Residual, binned
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
-from pamrs.simulation import core_rig
-from tests.diagnosis.noisy import whole
+from tests.diagnosis.asked import SETTINGS, problem_of
+from tests.diagnosis.noisy import noisy
 
 Array = NDArray[np.float64]
 RIG = pamrs.rigs.shoulder()
-SETTINGS = DiagnosisSettings()
 DT, ROWS = 0.005, 4000
-NOISE = {
-    "supply_pressure": 300.0,
-    "muscle_pressure": 300.0,
-    "joint_angle": 2e-4,
-    "valve_command": 1e-3,
-}
+NOISE = {"supply_pressure": 300.0, "muscle_pressure": 300.0, "joint_angle": 2e-4}
 HALF = float(np.radians(0.5))
 
 
@@ -47,9 +40,9 @@ def recorded(seed: int) -> tuple[Recording, Array]:
     time = DT * np.arange(ROWS)
     volts = 5.0 + 0.3 * np.sin(2.0 * time + seed) ** 2
     run = pamrs.simulate(RIG, volts, sample_time=DT)
-    rng = np.random.default_rng(seed)
-    channels = {n: run[n] + rng.normal(0.0, s, ROWS) for n, s in NOISE.items()}
-    return whole(f"r{seed}", "fit", DT, channels), run["joint_angle"]
+    channels = {n: run[n] for n in (*NOISE, "valve_command")}
+    noise = NOISE | {"valve_command": 1e-3}
+    return noisy(f"r{seed}", "fit", DT, channels, noise, [seed]), run["joint_angle"]
 
 
 def judged(off: list[Array], stated: dict[str, dict[str, float]]) -> Excess:
@@ -66,9 +59,8 @@ def arm(off: list[Array]) -> Problem:
     for seed, more in enumerate(off):
         found, _ = recorded(seed)
         channels = found.channels | {"joint_angle": found.channels["joint_angle"] + more}
-        recordings.append(prepare(replace(found, channels=channels), RIG, SETTINGS))
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.channel == "joint_angle"]
-    return Problem(blocks, recordings, core_rig(RIG), SETTINGS)
+        recordings.append(replace(found, channels=channels))
+    return problem_of(RIG, recordings, "arm")
 
 
 def smooth(seed: int) -> Array:

@@ -5,6 +5,7 @@ named.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,38 +15,22 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import prepare
 from pamrs.recordings import Recording, load_case
-from pamrs.rig import Rig, parse_rig
+from pamrs.rig import parse_rig
+from tests.diagnosis.asked import diagnosed, leading
 from tests.diagnosis.noisy import noisy
+from tests.diagnosis.stands import set_in_steps
 from tests.tables import text_of
 
 FAULTS = Path(__file__).parents[1] / "faults"
 REGULATED = text_of(__file__, "regulated")
-NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
 SLEW, DELAY = "supply_regulator_slew", "supply_regulator_delay"
-
-
-def diagnosed(rig: Rig, recordings: list[Recording]) -> pamrs.Diagnosis:
-    return pamrs.diagnose(pamrs.Case("case", rig, recordings, Path()))
-
-
-def steps_of(rig: Rig, role: str, seed: int) -> Recording:
-    """Five seconds at 200 Hz of steps of the set pressure."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 5.0, 0.005)
-    levels = np.concatenate([[0.5e5], rng.uniform(0.5e5, 6e5, 9)])  # at rest before the log
-    command = levels[(time / 0.5).astype(int)]
-    run = pamrs.simulate(rig, supply_command=command, sample_time=0.005)
-    channels = {"supply_command": command} | {name: run[name] for name in NOISE}
-    return noisy(f"r{seed}", role, 0.005, channels, NOISE, [7, seed])
 
 
 def regulated(**effects: dict[str, float]) -> pamrs.Diagnosis:
     rig = nominal = parse_rig(REGULATED)
     for effect, values in effects.items():
         rig = rig.with_effect(effect, values)
-    return diagnosed(
-        nominal, [steps_of(rig, role, k) for k, role in enumerate(("fit", "held_out"))]
-    )
+    return diagnosed(nominal, partial(set_in_steps, rig, seconds=5), ("fit", "held_out"))
 
 
 def test_dead_time_and_slew_limits_of_a_regulator_are_found_without_a_guess() -> None:
@@ -53,9 +38,9 @@ def test_dead_time_and_slew_limits_of_a_regulator_are_found_without_a_guess() ->
         supply_regulator_delay={"delay": 0.024},
         supply_regulator_slew={"rise_limit": 73e5, "fall_limit": 21e5},
     )
-    best = max(found.probabilities, key=lambda key: found.probabilities[key])
     # a late clock of the pressures is the same data as a dead time
-    assert best == f"{DELAY}+{SLEW}"
+    best = f"{DELAY}+{SLEW}"
+    assert leading(found) == best
     assert found.probabilities[best] > 0.6, found
     sizes = {name: p.value for e in found.effects for name, p in e.parameters.items()}
     assert sizes["delay"] == pytest.approx(0.024, abs=1e-3)
@@ -70,8 +55,7 @@ def test_a_regulator_without_limits_has_no_name() -> None:
 
 def test_an_outlet_that_is_laminar_is_no_lag_of_the_gauge() -> None:
     found = pamrs.diagnose(load_case(FAULTS / "05_laminar_outlet"))
-    best = max(found.probabilities, key=lambda key: found.probabilities[key])
-    assert best == "line_flow_law", found
+    assert leading(found) == "line_flow_law", found
     lags = [p for key, p in found.probabilities.items() if "pressure_lag" in key.split("+")]
     assert sum(lags) < 0.02, found
 
@@ -80,8 +64,7 @@ def test_a_load_cell_that_drifts_is_no_modulus_that_does() -> None:
     case = load_case(FAULTS / "06_load_cell_drift")
     shorter = [recording.between(None, 35.0) for recording in case.recordings]
     found = pamrs.diagnose(replace(case, recordings=shorter))
-    best = max(found.probabilities, key=lambda key: found.probabilities[key])
-    assert "load_cell_drift" in best.split("+"), found
+    assert "load_cell_drift" in leading(found).split("+"), found
 
 
 def test_even_strokes_are_no_steps_of_a_converter() -> None:
@@ -114,13 +97,12 @@ def stroked(role: str, seed: int, drift: float, gauge: float) -> Recording:
 )
 def test_each_recording_has_a_drift_of_its_own(effect: str, sizes: tuple[float, float]) -> None:
     cell = effect == "load_cell_drift"
-    recordings = [
-        stroked(role, seed, size * cell, size * (not cell))
-        for (seed, role), size in zip(enumerate(("fit", "fit")), sizes, strict=True)
-    ]
-    found = diagnosed(load_case(FAULTS / "06_load_cell_drift").rig, recordings)
-    best = max(found.probabilities, key=lambda key: found.probabilities[key])
-    assert best == effect, found
+
+    def made(role: str, seed: int) -> Recording:
+        return stroked(role, seed, sizes[seed] * cell, sizes[seed] * (not cell))
+
+    found = diagnosed(load_case(FAULTS / "06_load_cell_drift").rig, made, ("fit", "fit"))
+    assert leading(found) == effect, found
     (named,) = found.effects
     told = {event["recording"]: event["change"] for event in named.events}
     assert [told["r0"], told["r1"]] == pytest.approx(sizes, rel=0.15)

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.fit import Events, Problem, residuals
+from pamrs.diagnosis.fit import Events, residuals
 from pamrs.diagnosis.fit._lines import lines_of
-from pamrs.diagnosis.prepare import Residual, available_blocks, prepare
+from pamrs.diagnosis.prepare import Residual
 from pamrs.effects import Term
 from pamrs.recordings import Recording
-from pamrs.simulation import core_rig
-from tests.diagnosis.noisy import SHOULDER, noisy
+from tests.diagnosis.asked import ROLES, problem_of
+from tests.diagnosis.noisy import SHOULDER, driven
 
-SETTINGS = DiagnosisSettings()
-
+RIG = pamrs.rigs.shoulder()
 TIMES = {"lift": 4.3, "lower": 7.1, "again": 5.6}
-ROLES = {"lift": "fit", "lower": "fit", "again": "held_out"}
 
 
 def recordings(
@@ -29,7 +27,7 @@ def recordings(
     make: dict[str, float],
     duration: float = 12.0,
     *,
-    plant: pamrs.Rig | None = None,
+    plant: pamrs.Rig = RIG,
     form: str = "",
     own: dict[str, dict[str, float]] | None = None,
 ) -> list[Recording]:
@@ -45,13 +43,15 @@ def recordings(
             + (0.35 + 0.1 * number) * np.sin(2 * np.pi * 0.15 * time)
             + 0.25 * np.sin(2 * np.pi * 0.4 * time + number)
         )
-        rig = plant or pamrs.rigs.shoulder()
         here = {"time": when} if own is None else own[name]
-        rig = rig.with_effect(effect, make | here, form=form)
-        run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
-        channels = {"valve_command": command} | {n: run[n] for n in SHOULDER}
-        found.append(noisy(name, ROLES[name], 0.005, channels, SHOULDER, [2014, number]))
+        rig = plant.with_effect(effect, make | here, form=form)
+        given = {"valve_command": command}
+        found.append(driven(rig, name, ROLES[number], 0.005, given, SHOULDER, [2014, number]))
     return found
+
+
+def found_in(records: list[Recording], **options: Any) -> pamrs.Diagnosis:
+    return pamrs.diagnose(pamrs.Case("events", RIG, records, Path()), **options)
 
 
 @pytest.mark.parametrize(
@@ -62,9 +62,7 @@ def recordings(
     ],
 )
 def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -> None:
-    found = pamrs.diagnose(
-        pamrs.Case("events", pamrs.rigs.shoulder(), recordings(effect, make, 9.0), Path())
-    )
+    found = found_in(recordings(effect, make, 9.0))
     assert found.verdict == "effects"
     assert found.effects[0]["id"] == effect
     assert found.probabilities[effect] > 0.8
@@ -81,7 +79,7 @@ def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -
 def test_a_payload_that_is_poured_is_told_as_a_ramp() -> None:
     poured = {"mass_change": 0.6, "duration": 3.0}
     records = recordings("payload_change", poured, form="ramp")
-    found = pamrs.diagnose(pamrs.Case("poured", pamrs.rigs.shoulder(), records, Path()))
+    found = found_in(records)
     (effect,) = found.effects
     assert (effect["id"], effect["form"]) == ("payload_change", "ramp")
     assert found.probabilities["payload_change"] > 0.8
@@ -104,7 +102,7 @@ def test_a_vibration_is_found_with_another_phase_in_each_recording() -> None:
         for name, phase in phases.items()
     }
     records = recordings("external_torque", {"frequency": 1.37}, form="vibration", own=shaken)
-    found = pamrs.diagnose(pamrs.Case("shaken", pamrs.rigs.shoulder(), records, Path()))
+    found = found_in(records)
     assert found.probabilities["external_torque"] > 0.8
     (effect,) = found.effects
     assert effect["form"] in ("vibration", "two_vibrations")
@@ -134,17 +132,10 @@ def test_lines_stand_out_of_a_red_spectrum() -> None:
 
 
 def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
-    rig = pamrs.rigs.shoulder()
-    prepared = [
-        prepare(r, rig, SETTINGS)
-        for r in recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]
-    ]
-    blocks = [
-        b for b in available_blocks(rig, tuple(prepared[0].recording.channels)) if b.name == "arm"
-    ]
+    both = recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]
     happened = Events(Term("payload_change"), {"lift": {"mass_change": 0.4, "time": 2.0}})
     names = ["arm.payload", "payload_change.mass_change"]
-    found = residuals(Problem(blocks, prepared, core_rig(rig), SETTINGS), rig, names, happened)
+    found = residuals(problem_of(RIG, both, "arm"), RIG, names, happened)
     with_event, without = found["arm", "lift"].jacobian, found["arm", "lower"].jacobian
     assert with_event is not None
     assert without is not None
@@ -155,18 +146,14 @@ def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
 
 @pytest.mark.slow
 def test_a_push_is_found_beside_a_persistent_effect() -> None:
-    plant = pamrs.rigs.shoulder().with_effect(
-        "muscle_hysteresis", {"friction_pressure": 1e-4, "presliding": 0.003}
-    )
+    friction = {"friction_pressure": 1e-4, "presliding": 0.003}
+    plant = RIG.with_effect("muscle_hysteresis", friction)
     records = recordings("external_torque", {"torque": 5.0, "duration": 0.8}, plant=plant)
     # what such pushes leave beside the first name is inside what a model is usually off by
-    perfect = pamrs.DiagnosisSettings(usual_error=0.0)
-    both = pamrs.Case("both", pamrs.rigs.shoulder(), records, Path())
-    found = pamrs.diagnose(both, settings=perfect)
+    found = found_in(records, settings=pamrs.DiagnosisSettings(usual_error=0.0))
     assert found.probabilities["external_torque+muscle_hysteresis"] > 0.5
     (push,) = [e for e in found.effects if e["id"] == "external_torque"]
-    largest = {
-        e["recording"]: e["time"] for e in sorted(push["events"], key=lambda e: abs(e["torque"]))
-    }
+    events = sorted(push["events"], key=lambda e: abs(e["torque"]))
+    largest = {e["recording"]: e["time"] for e in events}
     assert all(abs(largest[name] - when) < 0.3 for name, when in TIMES.items())
     assert found.rig.effects[0]["id"] == "muscle_hysteresis"

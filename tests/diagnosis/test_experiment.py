@@ -26,28 +26,19 @@ NOISE = usual_noise()
 def pool():
     """The experiments of the shoulder."""
     names = ("null_ramp", "nested_triangles", "slow_triangle")
-    return {
-        e.name: e for e in library(pamrs.rigs.shoulder(), SETTINGS, sample_time=0.01, only=names)
-    }
+    found = library(pamrs.rigs.shoulder(), SETTINGS, sample_time=0.01, only=names)
+    return {experiment.name: experiment for experiment in found}
 
 
 @pytest.fixture(scope="module")
 def speeds(pool):
     """Creep or hysteresis, at two speeds and with holds."""
     rig = pamrs.rigs.shoulder()
+    friction = {"friction_constant": 0.5, "friction_pressure": 5e-6}
+    creep = {"stiffness": 60.0, "time_constant": 3.0}
     hypotheses = [
-        (
-            "muscle_hysteresis",
-            rig.with_effect(
-                "muscle_hysteresis", {"friction_constant": 0.5, "friction_pressure": 5e-6}
-            ),
-            0.5,
-        ),
-        (
-            "muscle_creep",
-            rig.with_effect("muscle_creep", {"stiffness": 60.0, "time_constant": 3.0}),
-            0.4,
-        ),
+        ("muscle_hysteresis", rig.with_effect("muscle_hysteresis", friction), 0.5),
+        ("muscle_creep", rig.with_effect("muscle_creep", creep), 0.4),
     ]
     return propose(rig, hypotheses, experiments=[pool["nested_triangles"], pool["slow_triangle"]])
 
@@ -119,14 +110,12 @@ def test_recordings_say_the_channels_the_clock_and_the_pressure() -> None:
     leak = rig.with_effect("leak_muscle", {"conductance": 1e-13})
     run = pamrs.simulate(rig, duration=20.0, sample_time=0.2, initial={"muscle_pressure": 4e5})
     prepared = taken(run, rig, "hold", NOISE, SETTINGS)
-    found = propose(
-        rig, [("none", rig, 0.6), ("leak_muscle", leak, 0.4)], {"muscle_pressure": 50.0}, [prepared]
-    )
+    rivals = [("none", rig, 0.6), ("leak_muscle", leak, 0.4)]
+    found = propose(rig, rivals, {"muscle_pressure": 50.0}, [prepared])
     assert max(found["excitation"]["levels_bar"]) <= 4.21
     assert found["curves"]["time"][1] == pytest.approx(0.2)
-    assert math.isclose(
-        found["curves"]["values"]["none"][0], found["curves"]["values"]["leak_muscle"][0]
-    )
+    none, leaking = (found["curves"]["values"][name] for name in ("none", "leak_muscle"))
+    assert math.isclose(none[0], leaking[0])
 
 
 def test_a_missing_sensor_is_proposed(pool) -> None:
@@ -141,25 +130,15 @@ def test_a_missing_sensor_is_proposed(pool) -> None:
     assert "one more channel: joint angle" in found["text"]
 
 
-def test_one_hypothesis_needs_no_experiment() -> None:
+def test_one_hypothesis_needs_no_experiment_and_impossible_arguments_are_named() -> None:
     rig = pamrs.rigs.sealed_chamber()
-    found = propose(
-        rig, [("none", rig, 0.999), ("leak_muscle", rig.with_effect("leak_muscle"), 0.0)]
-    )
+    leak = rig.with_effect("leak_muscle")
+    found = propose(rig, [("none", rig, 0.999), ("leak_muscle", leak, 0.0)])
     assert found["expected_information_bits"] == 0.0
-    assert found.curves is None
-    assert found["curves"] is None
-
-
-def test_impossible_arguments_are_named() -> None:
-    rig = pamrs.rigs.sealed_chamber()
+    assert found["curves"] is found.curves is None
     with pytest.raises(pamrs.ParameterError, match="hypotheses is empty"):
         propose(rig, [])
     with pytest.raises(pamrs.ParameterError, match="'none' is 1.5"):
         propose(rig, [("none", rig, 1.5)])
     with pytest.raises(pamrs.ParameterError, match="'angle'.*muscle_pressure"):
-        propose(
-            rig,
-            [("none", rig, 0.5), ("leak_muscle", rig.with_effect("leak_muscle"), 0.5)],
-            channels=("angle",),
-        )
+        propose(rig, [("none", rig, 0.5), ("leak_muscle", leak, 0.5)], channels=("angle",))

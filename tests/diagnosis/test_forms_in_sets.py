@@ -14,15 +14,14 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, significant
-from pamrs.diagnosis.fit import Problem, fit, form_in, starts_of
+from pamrs.diagnosis.fit import fit, form_in, starts_of
 from pamrs.diagnosis.model import owners_of_effects
-from pamrs.diagnosis.prepare import available_blocks, prepare
-from pamrs.diagnosis.screen import Screen, screen
+from pamrs.diagnosis.screen import screen
 from pamrs.diagnosis.search._sets import _STRONG_RATIO, Search, far_above_noise, in_best_forms
 from pamrs.effects import Term
-from pamrs.simulation import core_rig
 from tests.diagnosis.again import case
-from tests.diagnosis.held import RIG, SETTINGS, attempts
+from tests.diagnosis.asked import SETTINGS, problem_of
+from tests.diagnosis.held import RIG, attempts
 from tests.diagnosis.terms import terms
 
 SHOULDER = pamrs.rigs.shoulder()
@@ -35,11 +34,6 @@ def trial() -> Attempts:
     out.
     """
     return attempts(LEAKY, (8e5, 5e5, 3e5), 60.0)
-
-
-def search_with(trial: Attempts, screened: Screen, start: Candidate, told: list[str]) -> Search:
-    """What hypotheses are found with, and what is said meanwhile."""
-    return Search(trial, screened, start, Weighing(0.985, 60.0, SETTINGS), told.append)
 
 
 def hurried(trial: Attempts, evaluations: int) -> Candidate:
@@ -65,11 +59,11 @@ def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(trial: Atte
     base = hurried(trial, 20)
     assert any(significant(kept) for kept in base.fitted.values())
     start = fit(trial.inner, RIG, (), {}, trial.white)
-    screened = screen(
-        trial.inner, start, list(terms("leak_muscle", "heat_transfer")), trial.white, sealed=True
-    )
+    both = list(terms("leak_muscle", "heat_transfer"))
+    screened = screen(trial.inner, start, both, trial.white, sealed=True)
     told: list[str] = []
-    found = in_best_forms(search_with(trial, screened, base, told), base)
+    search = Search(trial, screened, base, Weighing(0.985, 60.0, SETTINGS), told.append)
+    found = in_best_forms(search, base)
     assert told[0] == "trying other forms of leak_muscle in leak_muscle+heat_transfer"
     assert form_in(found.fit.rig, Term("leak_muscle")) == "power"
     assert found.misfit < base.misfit
@@ -106,24 +100,12 @@ def test_the_group_that_knows_an_effect_best_has_its_values() -> None:
 
 
 def test_what_no_residual_depends_on_is_not_known() -> None:
-    given = case(SHOULDER, SHOULDER)
-    kept = [prepare(given.recordings[0], SHOULDER, SETTINGS)]
-    blocks = [
-        b
-        for b in available_blocks(SHOULDER, tuple(given.recordings[0].channels))
-        if b.name == "arm"
-    ]
-    problem = Problem(blocks, kept, core_rig(SHOULDER), SETTINGS)
+    problem = problem_of(SHOULDER, case(SHOULDER, SHOULDER).recordings[:1], "arm")
     # pressure and angle of one logger: the arm does not see when they were recorded
-    found = fit(
-        problem,
-        SHOULDER,
-        terms("clock_skew"),
-        {"clock_skew.offset": 0.01, "clock_skew.rate": 1e-4},
-        {"arm": 1.0},
-        fixed={"clock_skew.angle_share": 1.0},
-        evaluations=2,
-    )
+    free = {"clock_skew.offset": 0.01, "clock_skew.rate": 1e-4}
+    fixed = {"clock_skew.angle_share": 1.0}
+    given = (problem, SHOULDER, terms("clock_skew"), free, {"arm": 1.0})
+    found = fit(*given, fixed=fixed, evaluations=2)
     assert math.isinf(found.std["clock_skew.offset"])
     assert math.isinf(found.std["clock_skew.rate"])
     assert all(math.isfinite(found.std[name]) for name in found.moved)

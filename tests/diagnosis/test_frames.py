@@ -14,7 +14,6 @@ import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment import measurable
 from pamrs.diagnosis.next_experiment._differences import _FORCE_NOISE
@@ -26,9 +25,9 @@ from pamrs.experiments._maker import _FILLING_TIME
 from pamrs.recordings import load_recording
 from pamrs.simulation import reading, replay
 from tests.diagnosis import frames
+from tests.diagnosis.asked import SETTINGS
 from tests.diagnosis.frames import BENCH, PAIR, REGULATED, REST, VALVED
 
-OWN = DiagnosisSettings()
 HOME = Path(__file__).parents[2]
 OPEN = {
     "muscle_hysteresis": {"friction_constant": 2.0, "friction_pressure": 0.0, "presliding": 3e-3},
@@ -89,19 +88,19 @@ def test_small_strokes_once_more_settle_nothing(effect, strokes) -> None:
 
 @FRAMES
 def test_experiments_keep_to_what_a_frame_can_do(rig: pamrs.Rig) -> None:
-    pool = {e.name: e for e in library(rig, OWN, sample_time=0.01)}
+    pool = {e.name: e for e in library(rig, SETTINGS, sample_time=0.01)}
     assert {"slow_strokes", "strokes_at_speeds", "nested_strokes", "length_steps"} <= set(pool)
-    load = rig.tables("load")[""]
+    load, (rest, *_) = rig.tables("load")[""], rig.tables("muscle").values()
     filled = chains_of(rig)[0].before(rig) if rig in (VALVED, REGULATED) else None
     for experiment in pool.values():
         run = experiment.simulate(rig)
         length = experiment.commands["length"]
         assert length.min() >= load["min_length"]
-        assert length.max() <= rig.parameter(_rest_of(rig)).value
-        assert np.abs(np.diff(length)).max() <= OWN.length_rate * 0.01 * (1 + 1e-9)
+        assert length.max() <= rest["rest_length"]
+        assert np.abs(np.diff(length)).max() <= SETTINGS.length_rate * 0.01 * (1 + 1e-9)
         for name, values in experiment.commands.items():
             if name.startswith("pressure_command"):
-                assert np.abs(np.diff(values)).max() <= OWN.pressure_rate * 0.01 * (1 + 1e-9)
+                assert np.abs(np.diff(values)).max() <= SETTINGS.pressure_rate * 0.01 * (1 + 1e-9)
         for chain in chains_of(rig):
             assert run[chain.pressure].max() <= rig.limits["max_pressure"]
         force = reading(run, "force")
@@ -116,13 +115,9 @@ def test_experiments_keep_to_what_a_frame_can_do(rig: pamrs.Rig) -> None:
     assert all(np.ptp(values) > 0.0 for values in moved.values())
 
 
-def _rest_of(rig: pamrs.Rig) -> str:
-    return "muscle.left.rest_length" if rig is PAIR else "muscle.rest_length"
-
-
 def test_recordings_say_how_long_how_fast_and_how_high() -> None:
     given = frames.case(BENCH)
-    pool = experiments_of(BENCH, given.recordings, OWN)
+    pool = experiments_of(BENCH, given.recordings, SETTINGS)
     longest = max(frames.strokes(k)[0].max() for k in range(3))
     highest = max(frames.strokes(k)[1].max() for k in range(3))
     shortest = longest - _LEAST_STROKE * REST
@@ -135,15 +130,15 @@ def test_recordings_say_how_long_how_fast_and_how_high() -> None:
     time = 0.01 * np.arange(1000)
     fast = REST * 0.93 + 0.01 * np.sin(2 * np.pi * 2.0 * time)
     quick = frames.played(BENCH, "quick", "fit", fast, np.full(1000, 3e5), 9)
-    asked = experiments_of(BENCH, [quick], OWN, {"strokes_at_speeds"})[0].commands["length"]
+    asked = experiments_of(BENCH, [quick], SETTINGS, {"strokes_at_speeds"})[0].commands["length"]
     rate = float(np.abs(np.diff(asked)).max()) / 0.01
-    assert OWN.length_rate < rate <= 0.13
+    assert SETTINGS.length_rate < rate <= 0.13
 
 
 def test_a_muscle_that_was_held_is_moved_by_the_least_stroke() -> None:
     pressure = 3e5 + 1e5 * np.sin(np.arange(1000) * 0.05)
     held = frames.played(BENCH, "held", "fit", np.full(1000, 0.95 * REST), pressure, 1)
-    (found,) = experiments_of(BENCH, [held], OWN, {"slow_strokes"})
+    (found,) = experiments_of(BENCH, [held], SETTINGS, {"slow_strokes"})
     length = found.commands["length"]
     assert length.max() == pytest.approx(0.95 * REST, abs=3e-4)
     assert np.ptp(length) == pytest.approx(_LEAST_STROKE * REST, abs=3e-4)
@@ -153,7 +148,7 @@ def test_a_stand_that_cannot_move_gets_no_strokes() -> None:
     text = BENCH.to_toml_text().replace("17.0,", "27.4,").replace("28.5,", "27.55,")
     still = pamrs.rig.parse_rig(text)
     assert still.tables("load")[""]["max_length"] == pytest.approx(0.2755)
-    found = library(still, OWN, sample_time=0.01)
+    found = library(still, SETTINGS, sample_time=0.01)
     assert found
     assert all(np.ptp(e.commands["length"]) == 0.0 for e in found)
 
@@ -161,7 +156,7 @@ def test_a_stand_that_cannot_move_gets_no_strokes() -> None:
 @FRAMES
 def test_every_experiment_is_a_file_that_the_rig_plays(rig: pamrs.Rig, tmp_path: Path) -> None:
     file = tmp_path / "next.csv"
-    for experiment in library(rig, OWN, sample_time=0.01):
+    for experiment in library(rig, SETTINGS, sample_time=0.01):
         protocol = protocol_of(experiment)
         assert protocol is not None
         file.write_text(protocol.to_csv(), encoding="utf-8")
@@ -169,33 +164,29 @@ def test_every_experiment_is_a_file_that_the_rig_plays(rig: pamrs.Rig, tmp_path:
             continue  # something is set by hand, as its text says
         run = replay(rig, load_recording(file))
         own = experiment.simulate(rig)
-        np.testing.assert_allclose(
-            reading(run, "force"), reading(own, "force"), rtol=0.0, atol=1e-3
-        )
+        forces = (reading(one, "force") for one in (run, own))
+        np.testing.assert_allclose(*forces, rtol=0.0, atol=1e-3)
 
 
 def test_a_shut_valve_keeps_the_air_while_the_length_moves() -> None:
-    (experiment,) = library(VALVED, OWN, sample_time=0.01, only={"sealed_strokes"})
+    (experiment,) = library(VALVED, SETTINGS, sample_time=0.01, only={"sealed_strokes"})
     run = experiment.simulate(VALVED)
     shut = run.time >= _FILLING_TIME
     mass = run["air_mass"][shut]
     assert np.ptp(mass) < 1e-6 * mass.mean()
     pressure, volume = run["muscle_pressure"][shut] + 101325.0, run["air_volume"][shut]
     assert pressure[np.argmin(volume)] > pressure[np.argmax(volume)]
-    assert "sealed_strokes" not in {e.name for e in library(REGULATED, OWN, sample_time=0.01)}
+    assert "sealed_strokes" not in {e.name for e in library(REGULATED, SETTINGS, sample_time=0.01)}
 
 
 def test_a_frame_is_no_sealed_chamber_and_has_a_load_cell() -> None:
     assert not is_sealed(BENCH)
     assert measurable(BENCH) == ("muscle_pressure", "length", "force")
     assert "force" not in measurable(pamrs.rigs.named("hanging_mass"))
-    assert [chain.commands for chain in chains_of(PAIR)] == [
-        ("pressure_command.left",),
-        ("pressure_command.right",),
-    ]
-    run = pamrs.simulate(
-        PAIR, length=0.28, pressure={"left": 2e5, "right": 3e5}, sample_time=0.01, duration=0.1
-    )
+    commands = [chain.commands for chain in chains_of(PAIR)]
+    assert commands == [("pressure_command.left",), ("pressure_command.right",)]
+    given = {"length": 0.28, "pressure": {"left": 2e5, "right": 3e5}}
+    run = pamrs.simulate(PAIR, **given, sample_time=0.01, duration=0.1)
     both = run["muscle_force.left"] + run["muscle_force.right"]
     np.testing.assert_array_equal(reading(run, "force"), both)
     assert reading(run, "joint_angle") is None
@@ -204,29 +195,25 @@ def test_a_frame_is_no_sealed_chamber_and_has_a_load_cell() -> None:
 def test_nothing_says_how_high_a_bench_may_go() -> None:
     assert BENCH.muscle is not None
     bare = pamrs.rigs.bench(BENCH.muscle)
-    for what in (lambda: library(bare, OWN), lambda: pamrs.plan_diagnosis(bare, ["force"])):
+    for what in (lambda: library(bare, SETTINGS), lambda: pamrs.plan_diagnosis(bare, ["force"])):
         with pytest.raises(DiagnosisError, match="max_pressure"):
             what()
-    (told,) = library(bare, OWN, highest=2e5, only={"slow_strokes"})
+    (told,) = library(bare, SETTINGS, highest=2e5, only={"slow_strokes"})
     assert told.commands["pressure_command"].max() <= 2e5
     # a force map ends at its highest pressure
+    sizes = {"rest_length": 0.3, "rest_diameter": 0.023, "braid_angle": 1.1}
+    reach = {"max_pressure": 4e5, "contraction": (-0.02, 0.25)}
     muscle = pamrs.Muscle.from_law(
-        lambda p, e: 1e-3 * p * (1.0 - 3.0 * e),
-        max_pressure=4e5,
-        contraction=(-0.02, 0.25),
-        rest_length=0.3,
-        rest_diameter=0.023,
-        braid_angle=1.1,
-        wall_thickness=0.0015,
+        lambda p, e: 1e-3 * p * (1.0 - 3.0 * e), **reach, **sizes, wall_thickness=0.0015
     )
-    (found,) = library(pamrs.rigs.bench(muscle), OWN, only={"slow_triangle"})
+    (found,) = library(pamrs.rigs.bench(muscle), SETTINGS, only={"slow_triangle"})
     assert 3.5e5 < found.commands["pressure_command"].max() <= 4e5
 
 
 def planned(monkeypatch: pytest.MonkeyPatch, rig: pamrs.Rig, *effects: str):
     """Plans of a rig from a few experiments and effects in the place of all."""
     kinds = {"slow_triangle", "slow_strokes", "strokes_at_speeds", "sealed_hold"}
-    pool = library(rig, OWN, sample_time=0.01, only=kinds)
+    pool = library(rig, SETTINGS, sample_time=0.01, only=kinds)
     monkeypatch.setattr(plan, "library", lambda *_: pool)
     monkeypatch.setattr(plan, "CATALOGUE", {name: EFFECTS[name] for name in effects})
     return lambda *kinds, channels=(), noise=None: pamrs.plan_diagnosis(

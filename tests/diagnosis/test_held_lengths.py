@@ -11,15 +11,14 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis.prepare._signals import lengths_of, smoothed
-from pamrs.diagnosis.settings import DiagnosisSettings
 from tests.diagnosis import frames
+from tests.diagnosis.asked import SETTINGS
 from tests.diagnosis.frames import DT, played
 
 NOISE = frames.NOISE["length"]
 ROUGHLY = {"rest_length": 0.1, "rest_diameter": 0.01, "braid_angle": 0.5, "wall_thickness": 0.005}
 """Tolerances of a shape that nobody measured, in the units of the layout."""
 LAYOUT = Path(__file__).parents[2] / "cases" / "layouts" / "isometric_bench.toml"
-SETTINGS = DiagnosisSettings()
 
 
 @pytest.mark.parametrize("drift", [0.0, 1.0, 20.0])
@@ -71,10 +70,8 @@ def test_a_right_model_of_an_isometric_bench_is_told_nothing(seed: int, drift: f
 def test_a_force_that_is_missing_all_the_time_is_said() -> None:
     rig = pamrs.load_rig(LAYOUT)
     case = bench(rig, rig, 1, 0.0)
-    off = [
-        replace(r, channels=r.channels | {"force": r.channels["force"] + 45.0})
-        for r in case.recordings
-    ]
+    more = [r.channels | {"force": r.channels["force"] + 45.0} for r in case.recordings]
+    off = [replace(r, channels=own) for r, own in zip(case.recordings, more, strict=True)]
     found = pamrs.diagnose(replace(case, recordings=off))
     (warning,) = (w for w in found.warnings if "is fitted to each recording" in w)
     assert warning.startswith("muscle_force of the whole rig is ")

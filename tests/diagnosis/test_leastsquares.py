@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -11,7 +13,11 @@ from pamrs.diagnosis.fit import levenberg_marquardt
 from pamrs.errors import SimulationError
 
 Array = NDArray[np.float64]
-WIDE = (np.full(2, -10.0), np.full(2, 10.0))
+Box = tuple[Array, Array]
+
+
+def box(low: Sequence[float], high: Sequence[float]) -> Box:
+    return np.array(low, dtype=float), np.array(high, dtype=float)
 
 
 def decay(x: Array, time: Array, data: Array) -> tuple[Array, Array, str]:
@@ -24,19 +30,11 @@ def test_the_same_end_as_scipy_in_a_box(seed: int) -> None:
     rng = np.random.default_rng(seed)
     time = np.linspace(0.0, 3.0, 200)
     data = 2.0 * np.exp(-1.5 * time) + 0.01 * rng.standard_normal(200)
-    low, high = (
-        np.array([0.0, 0.1]),
-        np.array([1.8, 5.0]),
-    )  # the best amplitude lies beyond the wall
-    x, best, _ = levenberg_marquardt(
-        lambda x: decay(x, time, data), np.array([0.5, 0.5]), (low, high), 40
-    )
-    theirs = least_squares(
-        lambda x: decay(x, time, data)[0],
-        np.array([0.5, 0.5]),
-        jac=lambda x: decay(x, time, data)[1],
-        bounds=(low, high),
-    )
+    walls = box([0.0, 0.1], [1.8, 5.0])  # the best amplitude lies beyond the wall
+    start = np.array([0.5, 0.5])
+    x, best, _ = levenberg_marquardt(lambda x: decay(x, time, data), start, walls, 40)
+    rows, slopes = (lambda x, k=k: decay(x, time, data)[k] for k in (0, 1))
+    theirs = least_squares(rows, start, jac=slopes, bounds=walls)
     assert best[2] == "told"
     assert 0.5 * float(best[0] @ best[0]) <= theirs.cost * (1.0 + 2e-3) + 0.2
     assert np.allclose(x, theirs.x, rtol=2e-2)
@@ -52,9 +50,7 @@ def test_a_point_that_cannot_be_simulated_is_taken_back() -> None:
             raise SimulationError("beyond the model's range")
         return 10.0 * np.arctan(2.0 * (x - 1.0)), np.diag(20.0 / (1.0 + 4.0 * (x - 1.0) ** 2)), None
 
-    x, _, _ = levenberg_marquardt(
-        evaluate, np.array([-1.0]), (np.array([-5.0]), np.array([5.0])), 30
-    )
+    x, _, _ = levenberg_marquardt(evaluate, np.array([-1.0]), box([-5.0], [5.0]), 30)
     assert max(visited) > 1.5, "the first step overshoots: the case is empty otherwise"
     assert abs(float(x[0]) - 1.0) < 0.02
 
@@ -64,21 +60,18 @@ def test_a_start_that_cannot_be_simulated_is_an_error() -> None:
         raise SimulationError("no such plant")
 
     with pytest.raises(SimulationError, match="no such plant"):
-        levenberg_marquardt(evaluate, np.zeros(1), (np.array([-1.0]), np.array([1.0])), 5)
+        levenberg_marquardt(evaluate, np.zeros(1), box([-1.0], [1.0]), 5)
 
 
 def test_noise_is_not_worth_an_evaluation() -> None:
     rows = np.random.default_rng(1).standard_normal(1000)
     rows += 0.02 - rows.mean()  # a gain of 0.4 in a chi-square of 1000
     jacobian = np.ones((1000, 1))
-    found = levenberg_marquardt(
-        lambda x: (rows + jacobian[:, 0] * x[0], jacobian, None),
-        np.zeros(1),
-        (WIDE[0][:1], WIDE[1][:1]),
-        9,
-    )
-    spent = found[2]
-    assert spent == 1
+
+    def evaluate(x: Array) -> tuple[Array, Array, None]:
+        return rows + jacobian[:, 0] * x[0], jacobian, None
+
+    assert levenberg_marquardt(evaluate, np.zeros(1), box([-10.0], [10.0]), 9)[2] == 1
 
 
 def test_a_step_that_walls_bend_uphill_is_shortened() -> None:
@@ -91,9 +84,9 @@ def test_a_step_that_walls_bend_uphill_is_shortened() -> None:
     def evaluate(x: Array) -> tuple[Array, Array, None]:
         return 10.0 * root @ (x - aim), 10.0 * root, None
 
-    low, high = np.array([-1.0, -40.0]), np.array([1.0, 1.0])
-    x, (rows, _, _), _ = levenberg_marquardt(evaluate, np.zeros(2), (low, high), 40)
-    theirs = lsq_linear(10.0 * root, 10.0 * root @ aim, (low, high))
+    walls = box([-1.0, -40.0], [1.0, 1.0])
+    x, (rows, _, _), _ = levenberg_marquardt(evaluate, np.zeros(2), walls, 40)
+    theirs = lsq_linear(10.0 * root, 10.0 * root @ aim, walls)
     assert 0.5 * float(rows @ rows) <= theirs.cost * (1.0 + 2e-3)
     assert np.allclose(x, theirs.x, atol=1e-2)
 
@@ -106,12 +99,7 @@ def test_a_fit_ends_where_steps_do_not_keep_their_promise() -> None:
         spent.append(float(x[0]))
         return 10.0 + 5.0 * np.abs(x), np.array([[5.0]]), None
 
-    x, best, count = levenberg_marquardt(
-        evaluate, np.array([3.0]), (np.array([-9.0]), np.array([9.0])), 40
-    )
+    x, best, count = levenberg_marquardt(evaluate, np.array([3.0]), box([-9.0], [9.0]), 40)
     assert count == len(spent) < 12
-    assert (
-        float(best[0][0])
-        == 10.0 + 5.0 * abs(float(x[0]))
-        < min(10.0 + 5.0 * abs(a) for a in spent) + 1e-9
-    )
+    assert float(best[0][0]) == 10.0 + 5.0 * abs(float(x[0]))
+    assert abs(float(x[0])) < min(map(abs, spent)) + 1e-9

@@ -1,57 +1,41 @@
 """Where no recording is held out, each is predicted by the others: as a fit to the others would,
-without one.
+without one. What is predicted is as uncertain as the parameters are.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked
-from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.fit import Fit, Problem, fit, predicted_with_doubt, residuals, stacked
 from pamrs.diagnosis.screen import predicted_by_others
 from pamrs.recordings import Recording
-from pamrs.simulation import core_rig
+from tests.diagnosis.asked import diagnosed, problem_of
 from tests.diagnosis.held import hold as held_chamber
-
-SETTINGS = DiagnosisSettings()
+from tests.diagnosis.noisy import SHOULDER, driven
 
 RIG = pamrs.rigs.sealed_chamber()
-CHANNEL = {"muscle_pressure": "Pa"}
 
 
 def hold(name: str, conductance: float, seconds: float = 60.0, seed: int = 0) -> Recording:
     return held_chamber(conductance, seconds, name=name, seed=seed)
 
 
-#: Of two recordings: alike, and not.
-LEAKS = ((3e-11, 3e-11), (1e-11, 9e-11))
-
-
 def problem(*recordings: Recording) -> Problem:
-    blocks = available_blocks(RIG, ("muscle_pressure",))
-    return Problem(blocks, [prepare(r, RIG, SETTINGS) for r in recordings], core_rig(RIG), SETTINGS)
+    return problem_of(RIG, recordings)
+
+
+WHITE = {"chamber": 1.0}
 
 
 def leaking(given: Problem) -> Fit:
     """The leak fitted to every recording of a problem."""
-    start = {"leak_muscle.conductance": 1e-11}
-    white = {b.name: 1.0 for b in given.blocks}
-    return fit(
-        given,
-        RIG,
-        ("leak_muscle",),
-        start,
-        white,
-        fixed={"leak_muscle.laminar_share": 0.0},
-        evaluations=30,
-        share=0.0,
-    )
+    start, fixed = {"leak_muscle.conductance": 1e-11}, {"leak_muscle.laminar_share": 0.0}
+    effects = ("leak_muscle",)
+    return fit(given, RIG, effects, start, WHITE, fixed=fixed, evaluations=30, share=0.0)
 
 
 def rms(found: object, key: tuple[str, str]) -> float:
@@ -59,20 +43,14 @@ def rms(found: object, key: tuple[str, str]) -> float:
 
 
 def test_one_step_is_what_a_fit_to_the_others_predicts() -> None:
-    names = ("one", "two", "three")
-    everything = problem(
-        *(
-            hold(n, c, seed=k)
-            for k, (n, c) in enumerate(zip(names, (2e-11, 2.2e-11, 2.6e-11), strict=True))
-        )
-    )
+    leaks = {"one": 2e-11, "two": 2.2e-11, "three": 2.6e-11}
+    everything = problem(*(hold(n, c, seed=k) for k, (n, c) in enumerate(leaks.items())))
     found = leaking(everything)
-    away = predicted_by_others(everything, found, {b.name: 1.0 for b in everything.blocks})
-    for k, name in enumerate(names):
-        others = replace(
-            everything, recordings=[p for i, p in enumerate(everything.recordings) if i != k]
-        )
-        alone = replace(everything, recordings=[everything.recordings[k]])
+    away = predicted_by_others(everything, found, WHITE)
+    for k, name in enumerate(leaks):
+        every = everything.recordings
+        others = replace(everything, recordings=[*every[:k], *every[k + 1 :]])
+        alone = replace(everything, recordings=[every[k]])
         refitted = residuals(alone, leaking(others).rig)
         key = (everything.blocks[0].name, name)
         assert rms(away, key) > 1.1 * rms(found.residuals, key)
@@ -107,16 +85,18 @@ def test_of_one_recording_each_piece_is_predicted_by_the_others() -> None:
 def test_what_one_recording_alone_tells_is_taken_from_it() -> None:
     together = problem(hold("long", 2e-11, 200.0), hold("short", 2e-11, 4.0, seed=1))
     found = leaking(together)
-    away = predicted_by_others(together, found, {b.name: 1.0 for b in together.blocks})
+    away = predicted_by_others(together, found, WHITE)
     key = (together.blocks[0].name, "long")
     assert rms(away, key) < 1.01 * rms(found.residuals, key)
 
 
+def of_leaks(*leaks: float) -> pamrs.Diagnosis:
+    """Of two holds of two minutes."""
+    return diagnosed(RIG, lambda _, k: hold(f"r{k}", leaks[k], 120.0, seed=k), ("fit", "fit"))
+
+
 def test_recordings_without_roles_name_a_leak_that_is_in_all_of_them() -> None:
-    case = pamrs.Case(
-        "holds", RIG, [hold("one", 3e-11, 120.0), hold("two", 3e-11, 120.0, seed=1)], Path()
-    )
-    found = pamrs.diagnose(case)
+    found = of_leaks(3e-11, 3e-11)
     assert found.effects[0]["id"] == "leak_muscle"
     assert any("how the other recordings predict each" in w for w in found.warnings)
     one, two = (
@@ -128,9 +108,41 @@ def test_recordings_without_roles_name_a_leak_that_is_in_all_of_them() -> None:
 
 @pytest.mark.slow
 def test_a_leak_that_is_another_in_each_recording_is_less_sure() -> None:
-    alike, differ = (
-        pamrs.diagnose(pamrs.Case("holds", RIG, [hold("one", a, 120.0), two], Path()))
-        for a, two in ((c[0], hold("two", c[1], 120.0, seed=1)) for c in LEAKS)
-    )
+    alike, differ = of_leaks(3e-11, 3e-11), of_leaks(1e-11, 9e-11)
     # a name still carries most of it; that it is not the same in both speaks against it
     assert differ.probabilities["unlisted"] > 3.0 * alike.probabilities["unlisted"]
+
+
+SHOULDER_RIG = pamrs.rigs.shoulder()
+
+
+def moved(truth: pamrs.Rig, name: str, swing: float, seed: int) -> Recording:
+    """Eight seconds about the null of the valve, which stays shut without a swing."""
+    dt = 0.01
+    command = 5.0 + swing * np.sin(1.7 * dt * np.arange(800))
+    given, start = {"valve_command": command}, {"muscle_pressure": 2e5}
+    return driven(truth, name, "fit", dt, given, SHOULDER, [44, seed], initial=start)
+
+
+def power(there: Problem, found: dict[tuple[str, str], object]) -> float:
+    rows, _ = stacked(there, found, WHITE)  # type: ignore[arg-type]
+    return float(np.mean(rows**2))
+
+
+@pytest.mark.parametrize(("leak", "explained"), [(0.0, True), (4e-9, False)])
+def test_what_the_fit_leaves_open_is_no_mismatch_and_anything_else_is(
+    leak: float, explained: bool
+) -> None:
+    # shut, a valve says nothing of its area, which is 1.8 tolerances off
+    area = SHOULDER_RIG.parameter("valve.discharge_area_max")
+    truth = SHOULDER_RIG.with_parameters({area.name: area.value + 1.8 * area.tol})
+    shut = problem_of(SHOULDER_RIG, [moved(truth, "shut", 0.0, 1)], "chamber")
+    there = truth.with_effect("leak_muscle", {"conductance": leak}) if leak else truth
+    moving = problem_of(SHOULDER_RIG, [moved(there, "moving", 0.3, 2)], "chamber")
+    found = fit(shut, SHOULDER_RIG, (), {}, WHITE)
+    assert found.std[area.name] > 0.9 * area.tol
+    plain = power(moving, residuals(moving, found.rig))
+    doubted = power(moving, predicted_with_doubt(moving, found))
+    assert plain > 3.0
+    assert (doubted < 1.3) == explained
+    assert doubted < plain

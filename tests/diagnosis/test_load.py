@@ -13,19 +13,17 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.fit import Problem, fits, look_for_events, residuals
+from pamrs.diagnosis.fit import fits, look_for_events, residuals
 from pamrs.diagnosis.next_experiment import propose
-from pamrs.diagnosis.prepare import available_blocks, implausible, prepare
+from pamrs.diagnosis.prepare import implausible, prepare
 from pamrs.effects import Term
 from pamrs.errors import SimulationError
 from pamrs.experiments import library
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
-from tests.diagnosis.noisy import noisy
-
-SETTINGS = DiagnosisSettings()
+from tests.diagnosis.asked import ROLES, SETTINGS, blocks_of, problem_of
+from tests.diagnosis.noisy import driven, without
 
 RIG = pamrs.rigs.hanging_mass()
 NOISE = {"valve_command": 0.0, "supply_pressure": 300.0, "muscle_pressure": 300.0, "length": 3e-5}
@@ -47,29 +45,21 @@ def recording(
     }[name]
     lift = (time < 0.4) & (pressure == 0.0)
     command = np.concatenate([np.full(rest, 5.0), np.where(lift, 5.3, 5.02 + wave)])
-    run = pamrs.simulate(rig, command, sample_time=DT, initial={"muscle_pressure": pressure})
-    channels = {n: run[n][rest:] for n in NOISE}
-    return noisy(name, role, DT, channels, NOISE, [seed])
+    given, start = {"valve_command": command}, {"muscle_pressure": pressure}
+    return driven(rig, name, role, DT, given, NOISE, [seed], first=rest, initial=start)
 
 
 def case(rig: pamrs.Rig, pressure: float = 2.5e5) -> pamrs.Case:
-    roles = {"slow": "fit", "fast": "fit", "steps": "held_out"}
-    recordings = [
-        recording(rig, n, r, k, pressure=pressure) for k, (n, r) in enumerate(roles.items())
-    ]
-    return pamrs.Case("lift", RIG, recordings, Path())
+    names = enumerate(("slow", "fast", "steps"))
+    found = [recording(rig, name, ROLES[k], k, pressure=pressure) for k, name in names]
+    return pamrs.Case("lift", RIG, found, Path())
 
 
 def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() -> None:
-    blocks = {b.name: b for b in available_blocks(RIG, tuple(NOISE))}
+    blocks = blocks_of(RIG, NOISE)
     assert blocks["load"].kind == "arm"
     assert "length" in blocks["chamber"].drives
-    problem = Problem(
-        [blocks["load"]],
-        [prepare(recording(RIG, "slow", "fit", 0, 6.0), RIG, SETTINGS)],
-        core_rig(RIG),
-        SETTINGS,
-    )
+    problem = problem_of(RIG, [recording(RIG, "slow", "fit", 0, 6.0)], "load")
     names = [
         "load.mass",
         "load.viscous",
@@ -130,9 +120,8 @@ def test_the_zero_of_the_length_is_what_is_read_beside_the_true_one() -> None:
     assert other["muscle_pressure"] == pytest.approx(one["muscle_pressure"])
     zero = 'length_zero = { value = 1, unit = "mm" }'
     text = re.sub(r"\[sensors\]", rf"[sensors]\n{zero}", pamrs.rigs.sealed_chamber().to_toml_text())
-    with pytest.raises(
-        pamrs.RigError, match=r'length_zero is not allowed: a \[load\] with kind = "mass"'
-    ):
+    words = r'length_zero is not allowed: a \[load\] with kind = "mass"'
+    with pytest.raises(pamrs.RigError, match=words):
         parse_rig(text)
 
 
@@ -154,11 +143,8 @@ def test_a_length_that_cannot_be_is_refused() -> None:
 
 def test_a_load_behind_a_valve_that_was_not_recorded_is_driven_by_its_pressure() -> None:
     whole = recording(RIG, "slow", "fit", 0, 4.0)
-    bare = replace(
-        whole,
-        channels={n: v for n, v in whole.channels.items() if n in ("muscle_pressure", "length")},
-    )
-    assert [b.name for b in available_blocks(RIG, tuple(bare.channels))] == ["load"]
+    bare = without(whole, "valve_command", "supply_pressure")
+    assert list(blocks_of(RIG, bare.channels)) == ["load"]
     assert prepare(bare, RIG, SETTINGS).n == whole.time.size
 
 
@@ -166,19 +152,11 @@ def test_a_mass_that_changes_is_looked_for_and_found() -> None:
     assert RIG.muscle is not None
     assert fits(RIG, "payload_change")
     assert not fits(pamrs.rigs.bench(RIG.muscle), "payload_change")
-    changed = RIG.with_effect(
-        "payload_change", {"mass_change": -2.0, "time": 7.0}
-    )  # of which 4 s are not recorded
-    load = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "load"]
-    problem = Problem(
-        load,
-        [prepare(recording(changed, "slow", "fit", 0, 6.0), RIG, SETTINGS)],
-        core_rig(RIG),
-        SETTINGS,
-    )
-    found = look_for_events(
-        Term("payload_change"), problem, RIG, residuals(problem, RIG), {"load": 1.0}
-    )
+    change = {"mass_change": -2.0, "time": 7.0}  # of which 4 s are not recorded
+    changed = RIG.with_effect("payload_change", change)
+    problem = problem_of(RIG, [recording(changed, "slow", "fit", 0, 6.0)], "load")
+    own, white = residuals(problem, RIG), {"load": 1.0}
+    found = look_for_events(Term("payload_change"), problem, RIG, own, white)
     assert found is not None
     (values,) = found.values.values()
     assert values["mass_change"] == pytest.approx(-2.0, rel=0.2)
@@ -189,23 +167,16 @@ def test_the_next_experiment_with_a_load_is_simulated() -> None:
     assert [e.name for e in experiments] == ["staircase", "other_payload"]
     assert experiments[1].changes == {"load.mass": pytest.approx(20.0)}
     creeping = RIG.with_effect("muscle_creep")
-    told = propose(
-        RIG, [("none", RIG, 0.5), ("muscle_creep", creeping, 0.5)], experiments=experiments[:1]
-    )
+    rivals = [("none", RIG, 0.5), ("muscle_creep", creeping, 0.5)]
+    told = propose(RIG, rivals, experiments=experiments[:1])
     assert told["expected_information_bits"] > 0.3
     assert told["curves"] is not None
 
 
 @pytest.mark.slow
 def test_an_effect_on_a_load_is_named() -> None:
-    found = pamrs.diagnose(
-        case(
-            RIG.with_effect(
-                "muscle_hysteresis",
-                {"friction_constant": 4.0, "friction_pressure": 4e-5, "presliding": 2e-3},
-            )
-        )
-    )
+    friction = {"friction_constant": 4.0, "friction_pressure": 4e-5, "presliding": 2e-3}
+    found = pamrs.diagnose(case(RIG.with_effect("muscle_hysteresis", friction)))
     assert found.effects[0]["id"] == "muscle_hysteresis"
     assert found.effects[0]["probability"] > 0.7
     assert found.fit["gap_closed"] > 0.8
@@ -216,9 +187,7 @@ def test_an_effect_on_a_load_is_named() -> None:
 def test_a_frame_holds_the_length_and_has_no_block_of_its_own() -> None:
     assert RIG.muscle is not None
     bench = pamrs.rigs.bench(RIG.muscle)
-    assert not [
-        b for b in available_blocks(bench, ("muscle_pressure", "length")) if b.name == "load"
-    ]
+    assert "load" not in blocks_of(bench, ("muscle_pressure", "length"))
     signals = {
         n: (np.full(64, v), np.zeros(64)) for n, v in (("muscle_pressure", 2e5), ("length", 0.25))
     }

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.prepare import available_blocks, begun_alike, prepare, residual
+from pamrs.diagnosis.prepare import begun_alike, prepare, residual
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig
 from tests.diagnosis import slopes
-from tests.diagnosis.noisy import noisy
+from tests.diagnosis.asked import SETTINGS, blocks_of, diagnosed, problem_of
+from tests.diagnosis.noisy import driven
 
-SETTINGS = DiagnosisSettings()
 TEXT = pamrs.rigs.template("long_tube", "hose", "coefficients")
 CHANNELS = ("muscle_pressure.left", "muscle_pressure.right")
 NOISE = dict.fromkeys(CHANNELS, 300.0)
@@ -33,6 +30,7 @@ def stated(**tolerances: float) -> Rig:
 
 
 RIG = stated(length=0.2, alpha=0.0)
+RIGHT = blocks_of(RIG, CHANNELS)["chamber.right"]
 
 
 def opened(
@@ -40,18 +38,22 @@ def opened(
 ) -> Recording:
     """The outlet thrown open, 0.8 s at 500 Hz; a late one begins while air flows."""
     start = {"muscle_pressure.left": pressure}
-    run = pamrs.simulate(true, sample_time=0.002, duration=duration + late, initial=start)
-    channels = {name: run[name][round(late / 0.002) :] for name in CHANNELS}
-    return noisy(f"r{seed}", role, 0.002, channels, NOISE, [7, seed])
+    rows, seconds = round(late / 0.002), duration + late
+    given = {"first": rows, "duration": seconds, "initial": start}
+    return driven(true, f"r{seed}", role, 0.002, {}, NOISE, [7, seed], **given)
+
+
+PRESSURES = (2e5, 4e5, 3e5)
+"""Where the recordings of a case begin."""
 
 
 def test_both_gauges_are_boundaries_and_the_hose_lies_in_each_block() -> None:
-    blocks = {b.name: b for b in available_blocks(RIG, CHANNELS)}
+    blocks = blocks_of(RIG, CHANNELS)
     assert list(blocks) == ["chamber.left", "chamber.right"]
     for block in blocks.values():
         assert {"line.length", "line.diameter", "line.alpha"} <= block.parameters
     usual = RIG.with_parameters({"line.segments": 0})
-    for block in available_blocks(usual, CHANNELS):
+    for block in blocks_of(usual, CHANNELS).values():
         assert "line.length" in block.parameters
         assert "line.alpha" not in block.parameters
 
@@ -62,17 +64,15 @@ def test_both_gauges_are_boundaries_and_the_hose_lies_in_each_block() -> None:
 )
 def test_what_is_wrong_along_the_hose_shows(wrong: dict[str, float], seen: bool) -> None:
     prepared = prepare(opened(RIG.with_parameters(wrong), "fit", 0, 3e5), RIG, SETTINGS)
-    right = available_blocks(RIG, CHANNELS)[1]
-    left = residual(right, core_rig(RIG), prepared, [])
+    left = residual(RIGHT, core_rig(RIG), prepared, [])
     ratio = float(np.std(left.value[left.rows])) / left.noise
     assert (ratio > 2.0) == seen, ratio
 
 
 def test_sensitivities_are_those_of_differences() -> None:
     prepared = prepare(opened(RIG, "fit", 0, 3e5), RIG, SETTINGS)
-    block = available_blocks(RIG, CHANNELS)[1]
     names = ("line.length", "line.diameter", "line.alpha", "chamber.right.alpha_in")
-    slopes.are_those_of_differences(block, RIG, prepared, *names)
+    slopes.are_those_of_differences(RIGHT, RIG, prepared, *names)
 
 
 BALANCED = parse_rig(pamrs.rigs.template("long_tube"))
@@ -85,7 +85,7 @@ def test_what_shows_a_flow_before_the_recording_is_not_judged(rig: Rig, late: fl
     where that is forgotten.
     """
     prepared = prepare(opened(rig, "fit", 0, 4e5, late, 3.0), rig, SETTINGS)
-    blocks, core = available_blocks(rig, CHANNELS), core_rig(rig)
+    blocks, core = list(blocks_of(rig, CHANNELS).values()), core_rig(rig)
     kept = begun_alike(blocks, core, prepared)
     before, after = (residual(blocks[1], core, p, []) for p in (prepared, kept))
     assert np.std(before.value[before.rows]) > 1.7 * before.noise
@@ -109,20 +109,14 @@ def test_a_tube_that_was_at_rest_loses_nothing(
     """
     start = {"muscle_pressure.left": 2e5, "muscle_pressure.right": right}
     true = rig.with_parameters(wrong)
-    run = pamrs.simulate(true, sample_time=0.002, duration=1.0, initial=start)
-    one = noisy("r", "fit", 0.002, {name: run[name] for name in CHANNELS}, NOISE, [7, 3])
-    blocks = available_blocks(rig, CHANNELS)
-    kept = begun_alike(blocks, core_rig(rig), prepare(one, rig, SETTINGS))
-    assert kept.unsettled == {}
+    one = driven(true, "r", "fit", 0.002, {}, NOISE, [7, 3], duration=1.0, initial=start)
+    own = problem_of(rig, [one])
+    assert begun_alike(own.blocks, own.core, own.recordings[0]).unsettled == {}
 
 
 @pytest.mark.slow
 def test_a_diagnosis_of_what_begins_in_a_flow_finds_nothing() -> None:
-    recordings = [
-        opened(RIG, role, seed, pressure, 0.1, 3.0)
-        for seed, (role, pressure) in enumerate((("fit", 2e5), ("fit", 4e5), ("held_out", 3e5)))
-    ]
-    found = pamrs.diagnose(pamrs.Case("hose", RIG, recordings, Path()))
+    found = diagnosed(RIG, lambda role, k: opened(RIG, role, k, PRESSURES[k], 0.1, 3.0))
     assert found.verdict in ("none", "parameters")
     assert not found.effects
     told = [text for text in found.warnings if "were not judged" in text]
@@ -134,11 +128,7 @@ def test_a_diagnosis_of_what_begins_in_a_flow_finds_nothing() -> None:
 @pytest.mark.slow
 def test_another_length_is_a_parameter_and_no_missing_physics() -> None:
     true = RIG.with_parameters({"line.length": 8.3})
-    recordings = [
-        opened(true, role, seed, pressure)
-        for seed, (role, pressure) in enumerate((("fit", 2e5), ("fit", 4e5), ("held_out", 3e5)))
-    ]
-    found = pamrs.diagnose(pamrs.Case("hose", RIG, recordings, Path()))
+    found = diagnosed(RIG, lambda role, k: opened(true, role, k, PRESSURES[k]))
     assert found.verdict == "parameters"
     assert not found.effects
     length = found.parameters["line.length"]

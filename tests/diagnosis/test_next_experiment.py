@@ -15,6 +15,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import BlockGroup, Judged
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _choice, measurable, propose
 from pamrs.diagnosis.next_experiment._asked import _pair, _Question, _telling
@@ -35,9 +36,10 @@ from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
 from tests.diagnosis import again, test_places
+from tests.diagnosis.asked import SETTINGS, diagnosed
+from tests.diagnosis.likelihoods import made_up
+from tests.diagnosis.noisy import driven
 
-SETTINGS = DiagnosisSettings()
-OWN = SETTINGS
 NOISE = usual_noise()
 SHOULDER = pamrs.rigs.shoulder()
 ANTAGONISTS = pamrs.rigs.antagonistic_joint()
@@ -97,7 +99,7 @@ def test_rivals_are_told_apart_as_predicted(pair: str) -> None:
         rivals.append(rig.with_effect(effect, values, at=at[0] if at else ""))
         labels.append(str(Term(effect, *at)))
     hypotheses = [(label, rival, 0.5) for label, rival in zip(labels, rivals, strict=True)]
-    pool = library(rig, OWN, sample_time=0.01, highest=4e5, only=names)
+    pool = library(rig, SETTINGS, sample_time=0.01, highest=4e5, only=names)
     noise, channels = noise_of(rig), measurable(rig)
     proposed = propose(rig, hypotheses, noise, channels=channels, experiments=pool)
     chosen = next(e for e in pool if e.name == proposed.excitation["kind"])
@@ -131,11 +133,11 @@ def test_a_regulator_is_set_no_higher_than_is_known_to_be_allowed(tmp_path) -> N
     text = REGULATED.to_toml_text().partition("[limits]")[0]
     unlimited = parse_rig(text)
     with pytest.raises(DiagnosisError, match="max_pressure"):
-        library(unlimited, OWN)
+        library(unlimited, SETTINGS)
     with pytest.raises(DiagnosisError, match="max_pressure"):
         pamrs.plan_diagnosis(unlimited, ["muscle_pressure"])
     rig = limited(unlimited, 'max_pressure = { value = 2.5, unit = "bar" }', tmp_path)
-    pool = library(rig, OWN, sample_time=0.01)
+    pool = library(rig, SETTINGS, sample_time=0.01)
     assert {"set_steps", "fine_staircase", "nested_triangles"} <= {e.name for e in pool}
     assert not {"sealed_hold", "null_ramp", "step_and_shut"} & {e.name for e in pool}
     for experiment in pool:
@@ -146,7 +148,7 @@ def test_a_regulator_is_set_no_higher_than_is_known_to_be_allowed(tmp_path) -> N
 
 
 def payloads(rig: pamrs.Rig) -> list[Experiment]:
-    return library(rig, OWN, sample_time=0.01, only={"other_payload", "slow_triangle"})
+    return library(rig, SETTINGS, sample_time=0.01, only={"other_payload", "slow_triangle"})
 
 
 def test_another_payload_is_proposed_where_there_is_one(tmp_path) -> None:
@@ -177,25 +179,22 @@ def test_wrong_limits_are_named(text: str, tmp_path) -> None:
         limited(SHOULDER, text, tmp_path)
 
 
-def regulated(name: str, role: str, seed: int) -> Recording:
+STEADY = REGULATED.with_parameters({"supply.droop": 0.0})
+
+
+def regulated(role: str, seed: int) -> Recording:
     """A joint whose recorded command is not what its regulator got: nothing explains that."""
-    rng, time = np.random.default_rng([7, seed]), 0.005 * np.arange(800)
+    time = 0.005 * np.arange(800)
     command = 2e5 + 0.8e5 * np.sin(2.0 * np.pi * 0.2 * (1.0 + 0.4 * seed) * time + seed)
     command += 0.5e5 * np.sign(np.sin(2.0 * np.pi * 0.15 * time))
-    run = pamrs.simulate(steady(), supply_command=command, sample_time=0.005)
-    channels = {k: run[k] + rng.normal(0.0, s, time.size) for k, s in again.NOISE.items()}
-    channels["supply_command"] = command * (1.0 + 0.08 * np.sin(2.0 * np.pi * 0.8 * time))
-    mask = {k: np.ones(time.size, dtype=bool) for k in channels}
-    return Recording(name, role, run.time, 0.005, channels, mask, [], {})
-
-
-def steady() -> pamrs.Rig:
-    return REGULATED.with_parameters({"supply.droop": 0.0})
+    given = {"supply_command": command}
+    one = driven(STEADY, f"r{seed}", role, 0.005, given, again.NOISE, [7, seed])
+    read = {"supply_command": command * (1.0 + 0.08 * np.sin(2.0 * np.pi * 0.8 * time))}
+    return replace(one, channels=one.channels | read)
 
 
 def test_what_a_regulator_lacks_is_asked_of_the_regulator() -> None:
-    records = [regulated(name, role, k) for k, (name, role) in enumerate(again.ROLES)]
-    found = pamrs.diagnose(pamrs.Case("regulated", steady(), records, Path()))
+    found = diagnosed(STEADY, regulated)
     assert found.where.block == "supply"
     asked = found.next_experiment
     assert asked.excitation["block"] == "supply"
@@ -203,7 +202,7 @@ def test_what_a_regulator_lacks_is_asked_of_the_regulator() -> None:
     assert "hold" not in asked.excitation["kind"]
     assert "leak" not in asked.text
     assert asked.protocol is not None
-    highest = max(float(r.channels["supply_command"].max()) for r in records)
+    highest = max(regulated("fit", k).channels["supply_command"].max() for k in range(3))
     assert asked.protocol.commands["supply_command"].max() <= 1.05 * highest
 
 
@@ -262,8 +261,8 @@ def test_an_open_place_of_an_effect_gets_an_experiment_that_plays(
 ) -> None:
     monkeypatch.setattr(_choice, "_LEAST_PROBABILITY", 5e-4)
     leak = ANTAGONISTS.with_effect("leak_muscle", {"conductance": 2e-11}, at="flexor")
-    given = test_places.case(leak)
-    found = pamrs.diagnose(replace(given, recordings=given.recordings[:2]), settings=OPEN)
+    made = [test_places.recorded(leak, "fit", k) for k in range(2)]
+    found = diagnosed(ANTAGONISTS, lambda _, k: made[k], ("fit", "fit"), OPEN)
     assert found.ambiguity
     asked = found.next_experiment
     assert asked.pairs
@@ -277,14 +276,14 @@ def test_an_open_place_of_an_effect_gets_an_experiment_that_plays(
     )
     for side in ("flexor", "extensor"):
         name = f"muscle_pressure.{side}"
-        highest = max(float(np.max(r.channels[name])) for r in given.recordings[:2])
+        highest = max(float(np.max(r.channels[name])) for r in made)
         assert float(run[name].max()) <= 1.12 * highest
     assert "chamber of flexor" in found.summary()
 
 
 def test_an_effect_and_parameters_that_moved_are_simulated_as_a_pair() -> None:
     leak = SHOULDER.with_effect("leak_muscle", {"conductance": 3e-11})
-    pool = library(SHOULDER, OWN, sample_time=0.01, highest=4e5, only={"step_and_shut"})
+    pool = library(SHOULDER, SETTINGS, sample_time=0.01, highest=4e5, only={"step_and_shut"})
     hypotheses = [("leak_muscle", leak, 0.6), ("parameters", SHOULDER, 0.4)]
     found = propose(SHOULDER, hypotheses, NOISE, experiments=pool)
     (pair,) = found.pairs
@@ -303,11 +302,7 @@ def test_a_pair_that_nothing_simulates_is_told_in_words(driven: bool) -> None:
         cut = re.sub(r"(?m)^\[(supply|valve).*\n(?:(?!\[).*\n)*", "", rig.to_toml_text())
         rig = parse_rig(cut)
     blocks = available_blocks(rig, measurable(rig))
-    from pamrs.diagnosis.evidence import BlockGroup, Candidate, Judged
-    from pamrs.diagnosis.fit import Fit
-
-    fit = Fit((), rig, {}, {}, np.zeros((0, 0)), 0.0, {})
-    start = Candidate((), fit, {}, {}, 0.0)
+    start = made_up(rig, "", {})
     sets = [Hypothesis.parse("muscle_creep"), Hypothesis.parse("muscle_hysteresis")]
     arm = blocks[-1]
     group = BlockGroup([arm], {}, {}, [start], {}, arm, {}, [arm])

@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem, with_offsets
 from pamrs.diagnosis.fit._offsets import _later, _missed, _moved_alike
-from pamrs.diagnosis.prepare import available_blocks, averaged, begun_alike, prepare
+from pamrs.diagnosis.prepare import averaged, begun_alike
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
-from pamrs.simulation import core_rig
-from tests.diagnosis.noisy import noisy
-from tests.diagnosis.test_gas_law import NOISE, TEXT, recorded
+from tests.diagnosis.asked import diagnosed, problem_of
+from tests.diagnosis.noisy import GAUGES, noisy
+from tests.diagnosis.stands import WARM, vented
 
-RIG = parse_rig(TEXT)
-SETTINGS = DiagnosisSettings()
+RIG = parse_rig(WARM)
 
 
 def problem(recordings: Sequence[Recording]) -> Problem:
-    core = core_rig(RIG)
-    blocks = available_blocks(RIG, tuple(recordings[0].channels))
-    ready = [begun_alike(blocks, core, prepare(r, RIG, SETTINGS)) for r in recordings]
-    return Problem(blocks, ready, core, SETTINGS)
+    all_of = problem_of(RIG, recordings)
+    ready = [begun_alike(all_of.blocks, all_of.core, p) for p in all_of.recordings]
+    return replace(all_of, recordings=ready)
 
 
 @pytest.mark.parametrize("skipped", [0.6, 0.9])
@@ -36,8 +33,8 @@ def test_a_gas_that_begins_warm_is_no_offset(skipped: float) -> None:
     """The held-out one begins 17 and 5 K above the room behind an open valve, where its pressure
     stands still: its commands seemed to act 0.26 of a sample late, those of the others 0.2.
     """
-    recordings = [recorded(RIG, role, k) for k, role in enumerate(("fit", "fit"))]
-    recordings.append(recorded(RIG, "held_out", 2, NOISE, skipped))
+    recordings = [vented(RIG, "fit", k) for k in range(2)]
+    recordings.append(vented(RIG, "held_out", 2, skipped=skipped))
     every = problem(recordings)
     _, offsets = _moved_alike(every, RIG)
     assert offsets == {}
@@ -45,7 +42,7 @@ def test_a_gas_that_begins_warm_is_no_offset(skipped: float) -> None:
     assert missed < 1.1 * count  # 4.4 and 1.4 where it has to begin as warm as the room
 
 
-def beside_the_loop(role: str, seed: int, late: bool) -> Recording:
+def beside_the_loop(role: str, seed: int, late: bool = True) -> Recording:
     """Eight seconds of a loop of 200 Hz, logged at 500 Hz: a command is seen at the next sample."""
     rng = np.random.default_rng(seed)
     steps = 5.0 + rng.uniform(0.5, 4.0, 17) * np.tile([1.0, -1.0], 9)[:17]
@@ -54,8 +51,8 @@ def beside_the_loop(role: str, seed: int, late: bool) -> Recording:
     )  # of a millisecond; the loop sends at odd ones, too, the log has even ones
     command = steps[(rows + 495 + (0 if late else 1)) // 500]
     run = pamrs.simulate(RIG, valve_command=command, sample_time=0.001)
-    channels = {"valve_command": command[::2]} | {name: run[name][::2] for name in NOISE}
-    return noisy(f"r{seed}", role, 0.002, channels, NOISE, [7, seed])
+    channels = {"valve_command": command[::2]} | {name: run[name][::2] for name in GAUGES}
+    return noisy(f"r{seed}", role, 0.002, channels, GAUGES, [7, seed])
 
 
 @pytest.mark.parametrize("late", [True, False])
@@ -74,7 +71,7 @@ def test_a_log_beside_the_loop_has_its_commands_moved(late: bool) -> None:
 
 def test_what_was_moved_is_no_finer_than_a_pressure_tells() -> None:
     """A million samples at 1 kHz were 64 million numbers for each command."""
-    (one,) = problem([recorded(RIG, "fit", 0)]).recordings
+    (one,) = problem([vented(RIG, "fit", 0)]).recordings
     changes = np.flatnonzero(np.diff(one.held["valve_command"])) + 1
     for share in (0.5, -0.5):
         moved = _later(one, np.full(changes.size, share)).held["valve_command"]
@@ -86,7 +83,6 @@ def test_what_was_moved_is_no_finer_than_a_pressure_tells() -> None:
 
 
 def test_a_diagnosis_says_how_commands_were_moved() -> None:
-    logs = [beside_the_loop(role, k, True) for k, role in enumerate(("fit", "held_out"))]
-    found = pamrs.diagnose(pamrs.Case("case", RIG, logs, Path()))
+    found = diagnosed(RIG, beside_the_loop, ("fit", "held_out"))
     assert found.verdict == "none"
     assert sum("of a sample of the log earlier" in text for text in found.warnings) == 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -13,16 +14,17 @@ from numpy.typing import NDArray
 from scipy.signal import decimate
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import overlap, without_copies
 from pamrs.diagnosis.prepare._deviations import WINDOW_SAMPLES
 from pamrs.diagnosis.prepare._overlap import _GAP
 from pamrs.recordings import Recording
+from tests.diagnosis.held import RIG as CHAMBER
+from tests.diagnosis.held import hold
+from tests.diagnosis.noisy import SHOULDER as SENSORS
+from tests.diagnosis.noisy import driven
 
 Array = NDArray[np.float64]
-SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
-SENSORS = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 KINDS = ("multisine", "steps", "holds", "fast")
 
 
@@ -43,21 +45,15 @@ def run(
     *,
     seed: int = 1,
     dt: float = 0.005,
-    noise: float = 1.0,
     bits: float = 0.0,
     duration: float = 12.0,
-    role: str = "fit",
 ) -> Recording:
     """A shoulder under a command, with noise of its own; quantised to multiples of the noise."""
-    time = dt * np.arange(round(duration / dt))
-    volts = command(kind, time)
-    made = pamrs.simulate(RIG, volts, sample_time=dt)
-    rng = np.random.default_rng(seed)
-    channels = {"valve_command": volts}
-    for name, size in SENSORS.items():
-        values = made[name] + noise * size * rng.standard_normal(time.size)
-        channels[name] = np.round(values / (bits * size)) * bits * size if bits else values
-    return of(f"{kind}{seed}", role, dt, channels)
+    volts = {"valve_command": command(kind, dt * np.arange(round(duration / dt)))}
+    channels = driven(RIG, kind, "fit", dt, volts, SENSORS, [seed]).channels
+    for name, size in SENSORS.items() if bits else ():
+        channels[name] = np.round(channels[name] / (bits * size)) * bits * size
+    return of(f"{kind}{seed}", "fit", dt, channels)
 
 
 def of(name: str, role: str, dt: float, channels: dict[str, Array]) -> Recording:
@@ -68,52 +64,45 @@ def of(name: str, role: str, dt: float, channels: dict[str, Array]) -> Recording
     )
 
 
-def changed(one: Recording, how: str) -> Recording:
-    """A copy, as a person makes one."""
-    channels, dt = dict(one.channels), one.sample_time
-    if how == "shifted":
-        channels = {n: v[700:] for n, v in channels.items()}
-    elif how == "window":
-        channels = {n: v[900:1900] for n, v in channels.items()}
-    elif how == "every second":
-        channels, dt = {n: v[::2] for n, v in channels.items()}, 2 * dt
-    elif how == "means of five":
-        channels = {
-            n: v[: v.size // 5 * 5].reshape(-1, 5).mean(axis=1) for n, v in channels.items()
-        }
-        dt *= 5
-    elif how == "filtered":
-        channels, dt = {n: decimate(v, 4, ftype="fir") for n, v in channels.items()}, 4 * dt
-    elif how == "interpolated":
-        finer = np.arange(0.0, one.duration, 0.0037)
-        channels = {n: np.interp(finer, one.time, v) for n, v in channels.items()}
-        dt = 0.0037
-    elif how == "rounded":
-        channels = {n: np.array([float(f"{x:.5g}") for x in v]) for n, v in channels.items()}
-    elif how == "with holes":
-        gone = np.random.default_rng(3).random(len(one)) < 0.1
-        channels = {n: np.where(gone, np.nan, v) for n, v in channels.items()}
-    elif how == "extended":
-        other = run("multisine", seed=77, dt=dt)
-        channels = {
-            n: np.concatenate([other.channels[n][:800], v[1000:2000], other.channels[n][:800]])
-            for n, v in channels.items()
-        }
-    return of("copy", "held_out", dt, channels)
+def each(one: Recording, change: Callable[[Array], Array], dt: float = 0.0) -> Recording:
+    """A copy whose channels are changed, at another sample time where one is given."""
+    channels = {n: change(v) for n, v in one.channels.items()}
+    return of("copy", "held_out", dt or one.sample_time, channels)
 
 
-COPIES = (
-    "equal",
-    "shifted",
-    "window",
-    "every second",
-    "means of five",
-    "filtered",
-    "interpolated",
-    "rounded",
-    "with holes",
-    "extended",
-)
+def means_of_five(values: Array) -> Array:
+    return values[: values.size // 5 * 5].reshape(-1, 5).mean(axis=1)
+
+
+def interpolated(one: Recording) -> Recording:
+    finer = np.arange(0.0, one.duration, 0.0037)
+    return each(one, lambda v: np.interp(finer, one.time, v), 0.0037)
+
+
+def with_holes(one: Recording) -> Recording:
+    gone = np.random.default_rng(3).random(len(one)) < 0.1
+    return each(one, lambda v: np.where(gone, np.nan, v))
+
+
+def extended(one: Recording) -> Recording:
+    other = run("multisine", seed=77, dt=one.sample_time).between(0.0, 799 * one.sample_time)
+    window = one.between(1000 * one.sample_time, 1999 * one.sample_time)
+    return joined("copy", other, window, other)
+
+
+COPIES: dict[str, Callable[[Recording], Recording]] = {
+    "equal": lambda one: each(one, np.copy),
+    "shifted": lambda one: each(one, lambda v: v[700:]),
+    "window": lambda one: each(one, lambda v: v[900:1900]),
+    "every second": lambda one: each(one, lambda v: v[::2], 2 * one.sample_time),
+    "means of five": lambda one: each(one, means_of_five, 5 * one.sample_time),
+    "filtered": lambda one: each(one, lambda v: decimate(v, 4, ftype="fir"), 4 * one.sample_time),
+    "interpolated": interpolated,
+    "rounded": lambda one: each(one, lambda v: np.array([float(f"{x:.5g}") for x in v])),
+    "with holes": with_holes,
+    "extended": extended,
+}
+"""Copies, as a person makes them."""
 
 
 @pytest.mark.parametrize("bits", [pytest.param(0.0, marks=pytest.mark.slow), 2.0])
@@ -121,14 +110,14 @@ COPIES = (
 @pytest.mark.parametrize("how", COPIES)
 def test_copies_are_found_however_they_were_made(how: str, kind: str, bits: float) -> None:
     one = run(kind, bits=bits)
-    copy = changed(one, how)
+    copy = COPIES[how](one)
     for first, second in ((copy, one), (one, copy)):
         assert overlap(first, second) is not None
 
 
 def test_where_the_copy_lies_is_told() -> None:
     one = run()
-    found = overlap(changed(one, "window"), one)
+    found = overlap(COPIES["window"](one), one)
     assert found is not None
     assert found.own == pytest.approx((0.0, 5.0), abs=0.4)
     assert found.other == pytest.approx((4.5, 9.5), abs=0.4)
@@ -153,10 +142,10 @@ def test_a_repetition_is_no_copy(kind: str, bits: float, dt: float) -> None:
     assert overlap(two, one) is None
 
 
+@pytest.mark.parametrize("dt", [0.001, 0.02])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_repetition_at_another_rate_is_no_copy(kind: str) -> None:
-    assert overlap(run(kind), run(kind, seed=2, dt=0.001)) is None
-    assert overlap(run(kind), run(kind, seed=2, dt=0.02)) is None
+def test_a_repetition_at_another_rate_is_no_copy(kind: str, dt: float) -> None:
+    assert overlap(run(kind), run(kind, seed=2, dt=dt)) is None
 
 
 def test_windows_of_one_run_that_do_not_meet_are_two() -> None:
@@ -177,28 +166,22 @@ def test_rests_on_steps_of_a_converter_are_no_copies() -> None:
 
 def test_a_copy_is_left_out_of_the_proof_and_said() -> None:
     one, two = run(seed=1), replace(run(seed=2), role="held_out")
-    kept, said = without_copies([one, changed(one, "shifted"), two])
+    kept, said = without_copies([one, COPIES["shifted"](one), two])
     assert [r.name for r in kept] == [one.name, two.name]
     assert len(said) == 1
     assert "copy (copy.csv) holds the same samples as multisine1 (multisine1.csv)" in said[0]
     assert "it is no held-out proof and was left out of it" in said[0]
-    twice, said = without_copies([one, replace(changed(one, "equal"), role="fit"), two])
+    twice, said = without_copies([one, replace(one, name="copy"), two])
     assert [r.name for r in twice] == [one.name, two.name]
     assert "it says nothing more and was left out" in said[0]
     assert without_copies([one, two]) == ([one, two], [])
 
 
-def joined(name: str, *parts: Recording, role: str = "held_out") -> Recording:
-    """Recordings one after the other."""
+def joined(name: str, *parts: Recording) -> Recording:
+    """Recordings one after the other, to be held out."""
     names = parts[0].channels
     channels = {n: np.concatenate([part.channels[n] for part in parts]) for n in names}
-    return of(name, role, parts[0].sample_time, channels)
-
-
-def every(one: Recording, count: int) -> Recording:
-    """The same at a lower rate."""
-    channels = {n: v[::count] for n, v in one.channels.items()}
-    return of(one.name, one.role, one.sample_time * count, channels)
+    return of(name, "held_out", parts[0].sample_time, channels)
 
 
 @pytest.mark.parametrize(
@@ -209,7 +192,8 @@ def test_what_a_held_out_window_does_not_share_is_kept(kind: str, bits: float, c
     """Two windows of one file, the second one at another rate too."""
     whole = run(kind, duration=40.0, bits=bits)
     one = whole.between(0.0, 18.0)
-    proof = replace(every(whole.between(10.0, 40.0), count), name="proof", role="held_out")
+    later = whole.between(10.0, 40.0)
+    proof = replace(each(later, lambda v: v[::count], count * whole.sample_time), name="proof")
     kept, said = without_copies([one, proof])
     assert [r.name for r in kept] == [one.name, "proof"]
     # the first 8 s of it are shared; a gap, and a window in which that is told, are left out too
@@ -282,22 +266,19 @@ def test_a_stretch_is_kept_once() -> None:
     assert "it says nothing more and was left out" in said[-1]
 
 
-def leaking(duration: float) -> tuple[pamrs.Rig, Recording]:
-    """A sealed chamber, and a recording of a leak that it knows nothing of."""
-    rig = pamrs.rigs.sealed_chamber()
-    leaky = rig.with_effect("leak_muscle", {"conductance": 3e-11})
-    made = pamrs.simulate(
-        leaky, duration=duration, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
-    )
-    noise = np.random.default_rng(1).normal(0.0, 150.0, made.time.size)
-    return rig, of("hold", "fit", 0.1, {"muscle_pressure": made["muscle_pressure"] + noise})
+def leaking(duration: float) -> Recording:
+    """A recording of a sealed chamber with a leak that its file knows nothing of."""
+    return replace(hold(3e-11, duration), source="hold.csv")
+
+
+def found_in(*recordings: Recording) -> pamrs.Diagnosis:
+    return pamrs.diagnose(pamrs.Case("holds", CHAMBER, list(recordings), Path()))
 
 
 def test_a_diagnosis_is_proved_by_what_is_not_shared() -> None:
-    rig, whole = leaking(140.0)
-    fitted = whole.between(0.0, 60.0)
+    whole = leaking(140.0)
     proof = replace(whole.between(35.0, 140.0), name="proof", role="held_out")
-    found = pamrs.diagnose(pamrs.Case("windows", rig, [fitted, proof], Path()))
+    found = found_in(whole.between(0.0, 60.0), proof)
     assert found.fit.held_out
     assert [effect.id for effect in found.effects] == ["leak_muscle"]
     assert "proof (hold.csv) holds the same samples as hold" in found.warnings[0]
@@ -305,9 +286,8 @@ def test_a_diagnosis_is_proved_by_what_is_not_shared() -> None:
 
 
 def test_a_diagnosis_says_that_there_is_no_proof() -> None:
-    rig, hold = leaking(60.0)
-    again = replace(hold, name="again", role="held_out")
-    found = pamrs.diagnose(pamrs.Case("twice", rig, [hold, again], Path()))
+    one = leaking(60.0)
+    found = found_in(one, replace(one, name="again", role="held_out"))
     assert not found.fit.held_out
     assert found.proof == "the fitted recordings (none was held out)"
     assert "again (hold.csv) holds the same samples as hold" in found.warnings[0]

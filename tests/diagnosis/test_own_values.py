@@ -10,28 +10,25 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.fit import Problem, residuals
-from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.fit import residuals
+from pamrs.diagnosis.prepare import Residual
 from pamrs.errors import CaseError, DiagnosisError
 from pamrs.recordings import OwnValue, Recording, load_case
 from pamrs.rig import Rig, parse_rig
-from pamrs.simulation import core_rig
+from tests.diagnosis.asked import ROLES, problem_of
 from tests.diagnosis.noisy import SHOULDER as NOISE
-from tests.diagnosis.noisy import noisy
+from tests.diagnosis.noisy import driven
 from tests.diagnosis.test_gauge_zeros import FED
 from tests.tables import rows_of
 
-SETTINGS = DiagnosisSettings()
 DT = 0.005
 SHOULDER = pamrs.rigs.shoulder()
 SHOULDER_TEXT = SHOULDER.to_toml_text()
 NAME = "arm.payload"
 LOADS = {"light": SHOULDER.parameter(NAME).value, "heavy": 13.0, "half": 11.0}
-ROLES = {"light": "fit", "heavy": "fit", "half": "held_out"}
 
 
-def recordings(true: pamrs.Rig, *, told: bool, error: str = "same") -> list[Recording]:
+def recordings(true: pamrs.Rig, *, told: bool) -> list[Recording]:
     """A shoulder with another payload in each recording, which the recordings say or do not."""
     found = []
     nominal = SHOULDER.parameter(NAME).value
@@ -44,16 +41,18 @@ def recordings(true: pamrs.Rig, *, told: bool, error: str = "same") -> list[Reco
         )
         more = load - nominal
         rig = true.with_parameters({NAME: true.parameter(NAME).value + more})
-        run = pamrs.simulate(rig, command, sample_time=DT)
-        channels = {"valve_command": command} | {n: run[n] for n in NOISE}
-        own = {NAME: OwnValue(load, nominal, error)} if told and more else {}
-        found.append(noisy(name, ROLES[name], DT, channels, NOISE, [31, k], own))
+        one = driven(rig, name, ROLES[k], DT, {"valve_command": command}, NOISE, [31, k])
+        own = {NAME: OwnValue(load, nominal, "same")} if told and more else {}
+        found.append(replace(one, parameters=own))
     return found
 
 
+def found_in(rig: pamrs.Rig, records: list[Recording]) -> pamrs.Diagnosis:
+    return pamrs.diagnose(pamrs.Case("case", rig, records, Path()))
+
+
 def test_a_payload_that_is_told_is_no_missing_physics() -> None:
-    case = pamrs.Case("loads", SHOULDER, recordings(SHOULDER, told=True), Path())
-    found = pamrs.diagnose(case)
+    found = found_in(SHOULDER, recordings(SHOULDER, told=True))
     assert found.verdict in ("none", "parameters")
     assert found.fit["held_out"]["joint_angle"].after < 1.2 * np.degrees(3e-4)
     assert {d.recording: d.parameters for d in found.data} == {
@@ -67,8 +66,7 @@ def test_a_payload_that_is_told_is_no_missing_physics() -> None:
 @pytest.mark.slow
 def test_an_effect_is_named_beside_it() -> None:
     true = SHOULDER.with_effect("muscle_hysteresis", {"friction_pressure": 1e-4})
-    case = pamrs.Case("loads", SHOULDER, recordings(true, told=True), Path())
-    found = pamrs.diagnose(case)
+    found = found_in(SHOULDER, recordings(true, told=True))
     assert found.probabilities["muscle_hysteresis"] > 0.8
     assert found.fit["gap_closed"] > 0.9
 
@@ -80,17 +78,13 @@ def test_sensitivities_are_those_of_the_value_elsewhere(error: str, slope: float
     own = OwnValue(1.5 * nominal, nominal, error)
     assert own.slope == pytest.approx(slope)
     assert own.at(nominal) == pytest.approx(1.5 * nominal)
-    told = Recording(
-        "told", "fit", record.time, DT, record.channels, record.mask, parameters={NAME: own}
-    )
-    prepared = prepare(told, SHOULDER, SETTINGS)
-    (arm,) = [b for b in available_blocks(SHOULDER, tuple(record.channels)) if b.name == "arm"]
-    there = prepare(replace(told, parameters={}), SHOULDER, SETTINGS)
-    core = core_rig(SHOULDER)
-    found = residuals(Problem([arm], [prepared], core, SETTINGS), SHOULDER, [NAME])["arm", "told"]
+
+    def left(one: Recording, rig: Rig) -> Residual:
+        return residuals(problem_of(SHOULDER, [one], "arm"), rig, [NAME])["arm", one.name]
+
+    found = left(replace(record, parameters={NAME: own}), SHOULDER)
     # as of a rig that has the value everywhere
-    heavy = SHOULDER.with_parameters({NAME: 1.5 * nominal})
-    alone = residuals(Problem([arm], [there], core, SETTINGS), heavy, [NAME])["arm", "told"]
+    alone = left(record, SHOULDER.with_parameters({NAME: 1.5 * nominal}))
     assert found.jacobian is not None
     assert alone.jacobian is not None
     np.testing.assert_allclose(found.value, alone.value, rtol=0, atol=1e-12)
@@ -109,11 +103,10 @@ def nozzles(*, error: str) -> list[Recording]:
     for k, (name, area) in enumerate(AREAS.items()):
         time = np.arange(0.0, 10.0, DT)
         command = 5.0 + 0.4 * np.sin(1.2 * time + k) + 0.2 * np.sin(4.4 * time)
-        run = pamrs.simulate(SHOULDER.with_parameters({AREA: area}), command, sample_time=DT)
-        channels = {"valve_command": command} | {n: run[n] for n in NOISE}
+        rig = SHOULDER.with_parameters({AREA: area})
+        one = driven(rig, name, ROLES[k], DT, {"valve_command": command}, NOISE, [37, k])
         own = {AREA: OwnValue(nominal, nominal, error)} if error else {}
-        role = "held_out" if name == "between" else "fit"
-        found.append(noisy(name, role, DT, channels, NOISE, [37, k], own))
+        found.append(replace(one, parameters=own))
     return found
 
 
@@ -134,8 +127,7 @@ def told_of(found: pamrs.Diagnosis, name: str) -> tuple[dict[str, float], str]:
 @pytest.mark.parametrize("in_rig", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_value_of_each_recording_is_found_there(in_rig: bool) -> None:
     rig = left_to_recordings(SHOULDER, "discharge_area_max") if in_rig else SHOULDER
-    case = pamrs.Case("nozzles", rig, nozzles(error="" if in_rig else "own"), Path())
-    found = pamrs.diagnose(case)
+    found = found_in(rig, nozzles(error="" if in_rig else "own"))
     assert found.verdict in ("none", "parameters")
     values, told = told_of(found, AREA)
     assert "the largest is 2.9 times the smallest" in told
@@ -148,7 +140,7 @@ def test_a_value_of_each_recording_is_found_there(in_rig: bool) -> None:
 
 @pytest.mark.slow
 def test_nozzles_that_nobody_told_are_no_single_value() -> None:
-    found = pamrs.diagnose(pamrs.Case("nozzles", SHOULDER, nozzles(error=""), Path()))
+    found = found_in(SHOULDER, nozzles(error=""))
     assert found.verdict not in ("none", "parameters") or found.wrong_parameters
 
 
@@ -166,15 +158,12 @@ def test_a_leak_of_each_day_is_found_there(at: str) -> None:
     days = []
     for k, (day, rate) in enumerate(RATES.items()):
         true = tight.with_effect("leak_muscle", {"conductance": rate}, at=at)
-        run = pamrs.simulate(
-            true, duration=60.0, sample_time=0.1, step=0.01, initial={channel: 7e5}
-        )
-        role = "held_out" if day == "wednesday" else "fit"
-        days.append(noisy(day, role, 0.1, {channel: run[channel]}, {channel: 150.0}, [41, k]))
+        given = {"duration": 60.0, "step": 0.01, "initial": {channel: 7e5}}
+        days.append(driven(true, day, ROLES[k], 0.1, {}, {channel: 150.0}, [41, k], **given))
     rig = tight.with_effect("leak_muscle", {"conductance": 2e-11}, at=at)
     rig = left_to_recordings(rig, "conductance")
     assert rig.own == (f"leak_muscle.{at}.conductance" if at else LEAK,)
-    found = pamrs.diagnose(pamrs.Case("days", rig, days, Path()))
+    found = found_in(rig, days)
     assert found.verdict in ("none", "parameters"), found.summary()
     values, told = told_of(found, LEAK)
     assert values == pytest.approx(RATES, rel=0.05)
@@ -189,22 +178,18 @@ def test_a_tank_without_a_gauge_begins_each_recording_at_its_own_pressure() -> N
     name = "supply.initial_pressure"
     records = []
     for k, (day, begun) in enumerate(BEGUN.items()):
-        levels = np.random.default_rng(k).uniform(0.0, 10.0, 20).repeat(100)
-        run = pamrs.simulate(tank.with_parameters({name: begun}), levels, sample_time=DT)
-        channels = {"valve_command": levels, "muscle_pressure": run["muscle_pressure"]}
-        role = "held_out" if day == "later" else "fit"
-        records.append(noisy(day, role, DT, channels, {"muscle_pressure": 150.0}, [43, k]))
-    rig = left_to_recordings(tank, "initial_pressure")
-    found = pamrs.diagnose(pamrs.Case("tank", rig, records, Path()))
+        levels = {"valve_command": np.random.default_rng(k).uniform(0.0, 10.0, 20).repeat(100)}
+        true, noise = tank.with_parameters({name: begun}), {"muscle_pressure": 150.0}
+        records.append(driven(true, day, ROLES[k], DT, levels, noise, [43, k]))
+    found = found_in(left_to_recordings(tank, "initial_pressure"), records)
     assert found.verdict in ("none", "parameters"), found.summary()
     values, _ = told_of(found, name)
     assert values == pytest.approx(BEGUN, rel=0.02)
 
 
 def test_a_pressure_that_is_read_needs_no_value_of_its_own() -> None:
-    rig = left_to_recordings(SHOULDER, "initial_pressure")
     (first, *_) = recordings(SHOULDER, told=False)
-    found = pamrs.diagnose(pamrs.Case("read", rig, [first], Path()))
+    found = found_in(left_to_recordings(SHOULDER, "initial_pressure"), [first])
     assert "supply.initial_pressure: its gauge says where each recording begins" in found.warnings
 
 
@@ -281,6 +266,5 @@ def test_what_is_wrong_is_said(tmp_path: Path, parameters: str, message: str) ->
 def test_geometry_cannot_differ_in_a_diagnosis() -> None:
     (record, *_) = recordings(SHOULDER, told=False)
     own = {"muscle.rest_length": OwnValue(0.28, 0.276)}
-    odd = Recording("odd", "fit", record.time, DT, record.channels, record.mask, parameters=own)
     with pytest.raises(DiagnosisError, match=r"muscle\.rest_length cannot differ"):
-        pamrs.diagnose(pamrs.Case("odd", SHOULDER, [odd], Path()))
+        found_in(SHOULDER, [replace(record, parameters=own)])

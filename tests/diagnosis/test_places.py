@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import jsonschema
@@ -14,55 +16,31 @@ import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, weigh
-from pamrs.diagnosis.fit import Fit, Problem, acts_in, places_of, residuals, starts_of
+from pamrs.diagnosis.fit import Problem, acts_in, places_of, residuals, starts_of
+from pamrs.diagnosis.next_experiment import measurable
 from pamrs.diagnosis.noise import Excess
-from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.prepare import available_blocks
 from pamrs.diagnosis.result import schema
-from pamrs.effects import (
-    CATALOGUE,
-    Term,
-    find_parameter,
-)
+from pamrs.effects import CATALOGUE, Term, find_parameter
 from pamrs.findings import BlockVerdict
 from pamrs.recordings import Recording
 from pamrs.report.story import headline
 from pamrs.report.text import label, told_apart
 from pamrs.simulation import core_rig
-from tests.diagnosis import again, synthetic
-from tests.diagnosis.likelihoods import leaving
-from tests.diagnosis.noisy import noisy
+from tests.diagnosis import again, likelihoods, synthetic
+from tests.diagnosis.asked import SETTINGS, diagnosed, problem_of
+from tests.diagnosis.noisy import driven
+from tests.diagnosis.stands import antagonists
 from tests.diagnosis.terms import by_text, terms
 
-SETTINGS = DiagnosisSettings()
 PAIR = pamrs.rigs.antagonistic_joint()
-NOISE = {"supply_pressure": 400.0} | {
-    f"muscle_pressure.{name}": 400.0 for name in ("flexor", "extensor")
-}
 LEAK = 2e-11
 
 
-def recorded(rig: pamrs.Rig, name: str, role: str, seed: int, n: int = 1600) -> Recording:
-    """Both valves of the pair moved against each other, 8 s at 200 Hz; the angle is read finely."""
-    time, phase = 0.005 * np.arange(n), np.random.default_rng([7, seed]).uniform(0.0, 6.0, 3)
-    flexor = 5.0 + 0.5 * np.sin(1.3 * time + phase[0]) + 0.35 * np.sin(3.1 * time + phase[1])
-    extensor = 5.0 - 0.5 * np.sin(1.3 * time + phase[0] + 0.4) - 0.3 * np.sin(2.7 * time + phase[2])
-    run = pamrs.simulate(rig, {"flexor": flexor, "extensor": extensor}, sample_time=0.005)
-    names = ["valve_command.flexor", "valve_command.extensor", *NOISE, "joint_angle.elbow"]
-    noise = NOISE | {"joint_angle.elbow": 3e-3}
-    return noisy(name, role, 0.005, {n: run[n] for n in names}, noise, [11, seed])
-
-
-def case(truth: pamrs.Rig) -> pamrs.Case:
-    """Two recordings to fit and one held out."""
-    found = [recorded(truth, name, role, k) for k, (name, role) in enumerate(again.ROLES)]
-    units = {"valve_command": "V", "joint_angle": "rad"}
-    for recording in found:
-        recording.units.update(
-            {name: units.get(name.partition(".")[0], "Pa") for name in recording.channels}
-        )
-    return pamrs.Case("pair", PAIR, found, Path())
+def recorded(rig: pamrs.Rig, role: str, seed: int, rows: int = 1600) -> Recording:
+    """The pair with an angle that is read roughly."""
+    return antagonists(rig, role, seed, rows, 3e-3)
 
 
 TUBE = pamrs.rigs.named("tube")
@@ -79,24 +57,16 @@ def over(rig: pamrs.Rig) -> pamrs.Case:
     names = ("muscle_pressure.left", "muscle_pressure.right")
     for k, ((name, role), begin) in enumerate(zip(again.ROLES, BEGINS, strict=True)):
         start = dict(zip(names, begin, strict=True))
-        run = pamrs.simulate(rig, duration=5.0, sample_time=0.02, initial=start)
-        channels = {n: run[n] for n in names}
-        found.append(noisy(name, role, 0.02, channels, dict.fromkeys(names, 400.0), [11, k]))
+        given = {"duration": 5.0, "initial": start}
+        noise = dict.fromkeys(names, 400.0)
+        found.append(driven(rig, name, role, 0.02, {}, noise, [11, k], **given))
         found[-1].units.update(dict.fromkeys(names, "Pa"))
     return pamrs.Case("tube", TUBE, found, Path())
 
 
 def blocks_of(rig: pamrs.Rig, *without: str):
-    """The blocks of a rig whose pressures and angles are measured, but for some channels."""
-    kinds = (("supply_pressure", "supply"), ("muscle_pressure", "chamber"))
-    kinds += (("joint_angle", "joint"), ("valve_command", "valve"))
-    channels = [
-        f"{channel}.{name}" if name else channel
-        for channel, kind in kinds
-        for name in rig.tables(kind)
-    ]
-    told = tuple(name for name in channels if name not in without)
-    return available_blocks(rig, told)
+    """The blocks of a rig of which all is measured, but for some channels."""
+    return available_blocks(rig, [name for name in measurable(rig) if name not in without])
 
 
 def test_one_block_of_each_kind_leaves_every_effect_as_it_was() -> None:
@@ -144,9 +114,8 @@ def test_names_with_a_place() -> None:
     assert flexor.excluded_by([everywhere])
     assert flexor.excluded_by([flexor])
     assert not flexor.excluded_by([extensor, Term("valve_area")])
-    assert (
-        label("leak_muscle@flexor+valve_area") == f"{label('leak_muscle')} at flexor + valve area"
-    )
+    both = label("leak_muscle@flexor+valve_area")
+    assert both == f"{label('leak_muscle')} at flexor + valve area"
     told = told_apart([["leak_muscle"], ["leak_muscle@flexor"]], {})
     assert "at every chamber from" in told
     assert told.endswith("at flexor")
@@ -154,8 +123,7 @@ def test_names_with_a_place() -> None:
 
 def test_sensitivities_are_those_of_the_effect_at_its_place() -> None:
     """Against a finite difference, for one instance of an effect and for two."""
-    prepared = prepare(recorded(PAIR, "one", "fit", 0, n=400), PAIR, SETTINGS)
-    problem = Problem(blocks_of(PAIR), [prepared], core_rig(PAIR), SETTINGS)
+    problem = problem_of(PAIR, [recorded(PAIR, "fit", 0, 400)])
     here, there = (
         starts_of(Term("leak_muscle", at), sealed=False)[0] for at in ("flexor", "extensor")
     )
@@ -169,14 +137,14 @@ def test_sensitivities_are_those_of_the_effect_at_its_place() -> None:
         )
         found = residuals(problem, rig, [name])
         moved = residuals(problem, more, [name])
-        own = found["chamber.flexor", "one"]
-        slope = (moved["chamber.flexor", "one"].prediction - own.prediction) / step
+        own = found["chamber.flexor", "r0"]
+        slope = (moved["chamber.flexor", "r0"].prediction - own.prediction) / step
         assert own.jacobian is not None
         assert np.abs(slope).max() > 0.0
         # without what a window's start can do in its place
         expected = own.freed(slope)
         np.testing.assert_allclose(own.jacobian[:, 0], expected, atol=2e-2 * np.abs(expected).max())
-        assert not np.any(found["chamber.extensor", "one"].jacobian)
+        assert not np.any(found["chamber.extensor", "r0"].jacobian)
 
 
 def made_up(term: str, left: float, places: int) -> Candidate:
@@ -185,19 +153,13 @@ def made_up(term: str, left: float, places: int) -> Candidate:
     rig = PAIR
     for effect in effects:
         rig = rig.with_effect(effect.id, at=effect.at)
-    names = [f"{effect}.{effect.info.leading.name}" for effect in effects]
-    values = dict.fromkeys(names, 1e-11)
+    values = {f"{effect}.{effect.info.leading.name}": 1e-11 for effect in effects}
     spread = {name: 0.1 * value for name, value in values.items()}
     covariance = np.diag([std**2 for std in spread.values()])
-    scales = dict.fromkeys(names, 1.0)
-    found = Fit(effects, rig, values, spread, covariance, 0.0, {}, scales=scales)
-    kept = {
-        b.name: Excess(left, left**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
-        for b in blocks_of(PAIR)
-        if b.kind == "chamber"
-    }
-    told = leaving(kept)
-    return Candidate(effects, found, kept, kept, 0.0, places=math.log(places), likelihood=told)
+    left_of = Excess(left, left**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
+    kept = {b.name: left_of for b in blocks_of(PAIR) if b.kind == "chamber"}
+    found = likelihoods.made_up(rig, term, kept, values, std=spread, covariance=covariance)
+    return replace(found, places=math.log(places))
 
 
 def weighed(*found: Candidate) -> dict[str, float]:
@@ -266,24 +228,20 @@ def test_a_leak_of_one_of_two_chambers_is_named_with_its_place(leaking) -> None:
 def test_a_leak_of_one_muscle_of_a_pair_is_named_and_a_right_channel_stays_right() -> None:
     """Groups share the zeros of gauges: the arm keeps the ones that were settled before."""
     leak = {"conductance": LEAK}
-    found = pamrs.diagnose(case(PAIR.with_effect("leak_muscle", leak, at="flexor")))
+    found = diagnosed(PAIR, partial(recorded, PAIR.with_effect("leak_muscle", leak, at="flexor")))
     is_named(found, "flexor", LEAK)
     angle = found.fit.held_out["joint_angle.elbow"]
     assert angle.after < 1.3 * angle.refit
 
 
 def test_its_place_is_said_in_text_page_and_json(leaking, tmp_path) -> None:
-    said = f"{effect_words()} at left"
+    said = f"{Term('leak_muscle').info.name} at left"
     assert "leaves out a leak: muscle leak at left (" in headline(leaking)
     assert said in leaking.text
     assert said in leaking.report(tmp_path / "report.html").read_text(encoding="utf-8").lower()
     told = json.loads(leaking.to_json())
     jsonschema.validate(told, schema())
     assert told["effects"][0]["at"] == "left"
-
-
-def effect_words() -> str:
-    return Term("leak_muscle").info.name
 
 
 def test_the_model_has_it_there_and_is_replayed(leaking, tmp_path) -> None:

@@ -10,15 +10,13 @@ import pytest
 
 import pamrs
 from pamrs.cli import main
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment._differences import _KNOWN_SHARE, _free
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.experiments import commands_for, library, pressure_range
 from pamrs.simulation import core_rig
-
-SETTINGS = DiagnosisSettings()
+from tests.diagnosis.asked import SETTINGS
 
 ALL = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 
@@ -34,9 +32,8 @@ def test_levels_follow_from_the_rig() -> None:
 @pytest.mark.parametrize("gas", [(287.05, 1.4), (2077.1, 1.667), (188.9, 1.3)])
 def test_commands_are_found_for_the_gas_of_the_rig(gas: tuple[float, float]) -> None:
     constant, ratio = gas
-    rig = pamrs.rigs.shoulder().with_parameters(
-        {"gas.gas_constant": constant, "gas.heat_capacity_ratio": ratio}
-    )
+    own = {"gas.gas_constant": constant, "gas.heat_capacity_ratio": ratio}
+    rig = pamrs.rigs.shoulder().with_parameters(own)
     reference = np.interp(np.arange(401) * 0.01, [0.0, 1.0, 2.0, 4.0], [0.0, 1e5, 1e5, 3e5])
     (command,) = commands_for(rig, {"": reference}, sample_time=0.01).values()
     found = pamrs.simulate(rig, command, sample_time=0.01)["muscle_pressure"]
@@ -46,33 +43,19 @@ def test_commands_are_found_for_the_gas_of_the_rig(gas: tuple[float, float]) -> 
 def test_each_of_two_leaks_keeps_its_own_uncertainty() -> None:
     rig = pamrs.rigs.antagonistic_joint()
     problem = Problem([], [], core_rig(rig), SETTINGS)
-    one = rig.with_effect(
-        "leak_muscle", {"conductance": 5e-11}, at="flexor", std={"conductance": 1e-11}
-    )
+    spread = {"conductance": 1e-11}
+    one = rig.with_effect("leak_muscle", {"conductance": 5e-11}, at="flexor", std=spread)
     assert _free(problem, one)["leak_muscle.conductance"] == pytest.approx(1e-11)
     two = one.with_effect("leak_muscle", {"conductance": 6e-11}, at="extensor")
     free = _free(problem, two)
     assert free["leak_muscle.flexor.conductance"] == pytest.approx(1e-11)
-    share = _KNOWN_SHARE
-    assert free["leak_muscle.extensor.conductance"] == pytest.approx(share * 6e-11)
+    assert free["leak_muscle.extensor.conductance"] == pytest.approx(_KNOWN_SHARE * 6e-11)
 
 
 def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str], tmp_path) -> None:
     out = tmp_path / "plan.json"
-    assert (
-        main(
-            [
-                "diagnose",
-                "--plan",
-                "sealed_chamber",
-                "--pressure-noise",
-                "100 Pa",
-                "--json",
-                str(out),
-            ]
-        )
-        == 0
-    )
+    words = ["--plan", "sealed_chamber", "--pressure-noise", "100 Pa", "--json", str(out)]
+    assert main(["diagnose", *words]) == 0
     written = json.loads(out.read_text())
     assert written["schema"] == "pamrs.plan/1"
     assert written["noise"] == {"muscle_pressure": 100.0}
@@ -88,14 +71,14 @@ def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str],
 
 def test_unknown_names_are_errors_that_name_them() -> None:
     rig = pamrs.rigs.sealed_chamber()
-    with pytest.raises(pamrs.ParameterError, match="'pressure'.*muscle_pressure"):
-        pamrs.plan_diagnosis(rig, ["pressure"])
-    with pytest.raises(pamrs.ParameterError, match="'joint_angle'"):
-        pamrs.plan_diagnosis(rig, ["joint_angle"])
-    with pytest.raises(pamrs.ParameterError, match="'wiggle'.*hold_low"):
-        pamrs.plan_diagnosis(rig, ["muscle_pressure"], experiments=["wiggle"])
-    with pytest.raises(pamrs.ParameterError, match="muscle_pressure = -1"):
-        pamrs.plan_diagnosis(rig, ["muscle_pressure"], noise={"muscle_pressure": -1.0})
+    for channel, more, words in (
+        ("pressure", {}, "'pressure'.*muscle_pressure"),
+        ("joint_angle", {}, "'joint_angle'"),
+        ("muscle_pressure", {"experiments": ["wiggle"]}, "'wiggle'.*hold_low"),
+        ("muscle_pressure", {"noise": {"muscle_pressure": -1.0}}, "muscle_pressure = -1"),
+    ):
+        with pytest.raises(pamrs.ParameterError, match=words):
+            pamrs.plan_diagnosis(rig, [channel], **more)
 
 
 @pytest.mark.parametrize(
@@ -182,10 +165,8 @@ def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(
     quiet = {"muscle_pressure": 20.0, "supply_pressure": 20.0, "joint_angle": 1e-4}
     found = pamrs.plan_diagnosis(rig, ALL, experiments=["holds_both_sides"], noise=quiet)
     assert found.separable("leak_muscle", "valve_centre_leakage")
-    leaking, still = (
-        both.simulate(rig.with_effect("valve_centre_leakage", {"conductance": 3e-10})),
-        both.simulate(rig),
-    )
+    centre = rig.with_effect("valve_centre_leakage", {"conductance": 3e-10})
+    leaking, still = both.simulate(centre), both.simulate(rig)
     change = leaking["muscle_pressure"] - still["muscle_pressure"]
     start, stop = round(2.5 / both.sample_time), round(17.5 / both.sample_time)
     assert change[stop] > change[start]  # it fills below the balance

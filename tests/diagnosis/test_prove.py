@@ -12,13 +12,14 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import pamrs
 from pamrs import cli
 from pamrs.diagnosis.prove import cases_of, code_digest, prove, valid_result, worker
 from pamrs.errors import CaseError, ParameterError
+from tests.diagnosis import again
+from tests.diagnosis.held import RIG, hold
 
 #: A worker that writes down what it was given and answers by the name of the case.
 WORKER = """
@@ -57,24 +58,11 @@ def make(home, *names, manifest=True):
     return home
 
 
-def sealed(folder, conductance, seed):
+def sealed(folder, conductance):
     """A hold of a known chamber, 60 s at 10 Hz, as a case on disk."""
-    rig = pamrs.rigs.sealed_chamber()
-    truth = rig.with_effect("leak_muscle", {"conductance": conductance}) if conductance else rig
-    run = pamrs.simulate(
-        truth, duration=60.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
-    )
-    pressure = run["muscle_pressure"] + np.random.default_rng(seed).normal(
-        0.0, 150.0, run.time.size
-    )
-    folder.mkdir(parents=True)
-    (folder / "rig.toml").write_text(rig.to_toml_text())
-    rows = [f"{t:.1f},{p:.2f}" for t, p in zip(run.time, pressure, strict=True)]
-    (folder / "hold.csv").write_text("\n".join(["time [s],muscle_pressure [Pa]", *rows]) + "\n")
-    (folder / "case.toml").write_text(
-        'schema = "pamrs.case/1"\nrig = "rig.toml"\n\n[[recording]]\nfile = "hold.csv"\n'
-        'role = "fit"\n'
-    )
+    one = hold(conductance, 60.0)
+    one.units["muscle_pressure"] = "Pa"
+    again.written(pamrs.Case("hold", RIG, [one], folder), folder)
 
 
 def test_every_case_has_a_process_that_is_given_that_case_alone(tmp_path, fake):
@@ -86,10 +74,8 @@ def test_every_case_has_a_process_that_is_given_that_case_alone(tmp_path, fake):
     seen = [valid_result(home / "results" / name / "out.json")["seen"] for name in proof.cases]
     assert len({s["pid"] for s in seen}) == 3
     for name, told in zip(proof.cases, seen, strict=True):
-        assert told["arguments"] == [
-            str(home / "cases" / name),
-            str(home / "results" / name / "out.json"),
-        ]
+        out = home / "results" / name / "out.json"
+        assert told["arguments"] == [str(home / "cases" / name), str(out)]
         assert told["threads"] == "1"
     assert len(lines) == 3
     assert "left" in lines[0]
@@ -102,17 +88,11 @@ def test_run_json_says_with_what_and_how_long(tmp_path, fake):
     told = json.loads((home / "results" / "run.json").read_text())
     assert told["schema"] == "pamrs.prove/1"
     assert told["version"] == pamrs.__version__
-    assert (
-        told["manifest_sha256"] == hashlib.sha256((home / "manifest.json").read_bytes()).hexdigest()
-    )
+    digest = hashlib.sha256((home / "manifest.json").read_bytes()).hexdigest()
+    assert told["manifest_sha256"] == digest
     assert told["machine"]["cores"] >= 1
-    entry = told["cases"]["leak_a"]
-    assert (entry["verdict"], entry["seconds"], entry["cpu_seconds"], entry["code"]) == (
-        "effects",
-        1.5,
-        2.5,
-        code_digest(),
-    )
+    wanted = {"verdict": "effects", "seconds": 1.5, "cpu_seconds": 2.5, "code": code_digest()}
+    assert told["cases"]["leak_a"].items() >= wanted.items()
 
 
 def test_a_run_goes_on_where_it_was(tmp_path, fake):
@@ -120,9 +100,8 @@ def test_a_run_goes_on_where_it_was(tmp_path, fake):
     prove(home, command=fake, limit=1)
     first = (home / "results" / "leak_a" / "out.json").read_bytes()
     (home / "results" / "leak_b").mkdir()
-    (home / "results" / "leak_b" / "out.json").write_text(
-        '{"schema": "pamrs.diagnosis/1", "verd'
-    )  # half a file
+    half = '{"schema": "pamrs.diagnosis/1", "verd'
+    (home / "results" / "leak_b" / "out.json").write_text(half)
     proof = prove(home, command=fake)
     assert proof.kept == 1
     assert len(proof.cases) == 3
@@ -255,32 +234,24 @@ def test_what_is_refused(tmp_path):
 
 
 def test_two_real_cases_from_the_command_line(tmp_path, capsys):
+    trial, out = tmp_path / "trial", tmp_path / "out"
     for name, conductance in (("one", 3e-11), ("two", 0.0)):
-        sealed(tmp_path / "trial" / name, conductance, 1)
-    assert (
-        cli.main(
-            ["prove", str(tmp_path / "trial"), "--results", str(tmp_path / "out"), "--jobs", "2"]
-        )
-        == 0
-    )
+        sealed(trial / name, conductance)
+    words = ["prove", str(trial), "--results", str(out)]
+    assert cli.main([*words, "--jobs", "2"]) == 0
     told = capsys.readouterr()
     assert "effects" in told.out
     assert "[2/2]" in told.err
-    verdicts = [
-        valid_result(tmp_path / "out" / name / "out.json")["verdict"] for name in ("one", "two")
-    ]
+    verdicts = [valid_result(out / name / "out.json")["verdict"] for name in ("one", "two")]
     assert verdicts == ["effects", "none"]
-    (tmp_path / "trial" / "two" / "hold.csv").unlink()
-    shutil.rmtree(tmp_path / "trial" / "one")
-    assert (
-        cli.main(["prove", str(tmp_path / "trial"), "--results", str(tmp_path / "out"), "--fresh"])
-        == 3
-    )
+    (trial / "two" / "hold.csv").unlink()
+    shutil.rmtree(trial / "one")
+    assert cli.main([*words, "--fresh"]) == 3
     assert "two: CaseError" in capsys.readouterr().out
 
 
 def test_the_worker_itself(tmp_path, capsys):
-    sealed(tmp_path / "one", 3e-11, 1)
+    sealed(tmp_path / "one", 3e-11)
     assert worker([str(tmp_path / "one"), str(tmp_path / "out.json")]) == 0
     assert json.loads(capsys.readouterr().out)["cpu_seconds"] > 0
     assert valid_result(tmp_path / "out.json")["verdict"] == "effects"

@@ -4,31 +4,26 @@ at a joint.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
-from tests.diagnosis.noisy import SHOULDER, noisy
+from tests.diagnosis.asked import ROLES, diagnosed
+from tests.diagnosis.noisy import SHOULDER, driven, noisy, without
 
-SETTINGS = DiagnosisSettings()
 DT = 0.005
 MUSCLE = pamrs.rigs.shoulder().muscle
 assert MUSCLE is not None
 BENCH = pamrs.rigs.bench(MUSCLE)
 REST = BENCH.parameter("muscle.rest_length").value
-ROLES = {"slow": "fit", "fast": "fit", "other": "held_out"}
-
-
-def recorded(name: str, values: dict[str, np.ndarray], noise: dict[str, float]) -> Recording:
-    """A recording with the noise of transducers."""
-    return noisy(name, ROLES[name], DT, values, noise, [17, list(ROLES).index(name)])
 
 
 def pulled(true: pamrs.Rig, tare: float = 0.0) -> pamrs.Case:
@@ -36,7 +31,8 @@ def pulled(true: pamrs.Rig, tare: float = 0.0) -> pamrs.Case:
     ``tare`` [N] at rest.
     """
     found = []
-    for k, name in enumerate(ROLES):
+    noise = {"muscle_pressure": 300.0, "length": 2e-5, "force": 1.0}
+    for k, role in enumerate(ROLES):
         time = np.arange(0.0, 10.0, DT)
         length = REST * (
             0.88
@@ -50,14 +46,12 @@ def pulled(true: pamrs.Rig, tare: float = 0.0) -> pamrs.Case:
             "length": length,
             "force": run["muscle_force"] + tare * (1 + k),
         }
-        noise = {"muscle_pressure": 300.0, "length": 2e-5, "force": 1.0}
-        found.append(recorded(name, channels, noise))
+        found.append(noisy(f"r{k}", role, DT, channels, noise, [17, k]))
     return pamrs.Case("bench", BENCH, found, Path())
 
 
 def test_the_force_is_that_of_a_simulation() -> None:
-    case = pulled(BENCH)
-    (block,) = available_blocks(BENCH, case.channels)
+    (block,) = available_blocks(BENCH, pulled(BENCH).channels)
     assert (block.name, block.kind, block.channel) == ("force", "pull", "force")
     time = np.arange(0.0, 4.0, DT)
     length, slope = 0.25 + 0.01 * np.sin(time), 0.01 * np.cos(time)
@@ -104,51 +98,24 @@ def test_what_a_force_lacks_is_named(effect: str, values: dict[str, float]) -> N
 
 def test_a_frame_without_its_force_is_refused() -> None:
     case = pulled(BENCH)
-    bare = [
-        Recording(
-            r.name,
-            r.role,
-            r.time,
-            DT,
-            {n: v for n, v in r.channels.items() if n != "force"},
-            {n: m for n, m in r.mask.items() if n != "force"},
-            [],
-            {},
-        )
-        for r in case.recordings
-    ]
+    bare = [without(r, "force") for r in case.recordings]
     with pytest.raises(DiagnosisError, match="every recording needs the channel force"):
-        pamrs.diagnose(pamrs.Case("bench", BENCH, bare, Path()))
+        pamrs.diagnose(replace(case, recordings=bare))
 
 
-def turned(true: pamrs.Rig) -> pamrs.Case:
+def turned(true: pamrs.Rig, role: str, k: int) -> Recording:
     """A shoulder that its valve moves, with a torque sensor between the muscles and the joint."""
-    found = []
-    for k, name in enumerate(ROLES):
-        time = np.arange(0.0, 12.0, DT)
-        command = (
-            5.0
-            + (0.35 + 0.1 * k) * np.sin(2 * np.pi * 0.15 * time)
-            + 0.25 * np.sin(2 * np.pi * 0.4 * time + k)
-        )
-        run = pamrs.simulate(true, command, sample_time=DT)
-        noise = {"valve_command": 0.0, **SHOULDER, "joint_torque": 0.3}
-        found.append(
-            recorded(
-                name,
-                {"valve_command": command} | {n: run[n] for n in (*SHOULDER, "joint_torque")},
-                noise,
-            )
-        )
-    return pamrs.Case("torque", pamrs.rigs.shoulder(), found, Path())
+    turn = 2 * np.pi * np.arange(0.0, 12.0, DT)
+    wave = (0.35 + 0.1 * k) * np.sin(0.15 * turn) + 0.25 * np.sin(0.4 * turn + k)
+    noise = {"valve_command": 0.0, **SHOULDER, "joint_torque": 0.3}
+    return driven(true, f"r{k}", role, DT, {"valve_command": 5.0 + wave}, noise, [17, k])
 
 
 @pytest.mark.slow
 def test_a_torque_tells_friction_of_the_joint_from_that_of_the_muscle() -> None:
-    true = pamrs.rigs.shoulder().with_effect(
-        "joint_coulomb_stribeck", {"stiction": 3.0, "stribeck_speed": 0.08}
-    )
-    found = pamrs.diagnose(turned(true))
+    rig = pamrs.rigs.shoulder()
+    true = rig.with_effect("joint_coulomb_stribeck", {"stiction": 3.0, "stribeck_speed": 0.08})
+    found = diagnosed(rig, partial(turned, true))
     assert found.probabilities["joint_coulomb_stribeck"] > 0.8
     assert found.where["block"] == "arm"
     torque = next(m for b in found.blocks for m in b.mismatch if m.block == "torque")
@@ -158,21 +125,17 @@ def test_a_torque_tells_friction_of_the_joint_from_that_of_the_muscle() -> None:
 @pytest.mark.slow
 def test_a_muscle_that_is_a_table_is_diagnosed_as_others_are() -> None:
     """No force model: its measured map, with a kink in pressure that no other model has."""
-    given = BENCH.muscle
-    assert given is not None
     sizes = ("rest_length", "rest_diameter", "braid_angle", "wall_thickness", "geometry")
     muscle = pamrs.Muscle.from_law(
         lambda p, e: 1.5e-3 * 3e4 * np.logaddexp(0.0, (p - 1e5) / 3e4) * (1 - 2.5 * e) - 300 * e,
         max_pressure=4e5,
         contraction=(-0.01, 0.3),
-        **{name: given.parameters[name] for name in sizes},
+        **{name: MUSCLE.parameters[name] for name in sizes},
     )
     bench = pamrs.rigs.bench(muscle)
     for concealed in ({}, {"friction_constant": 12.0, "presliding": 1e-3}):
         true = bench.with_effect("muscle_hysteresis", concealed) if concealed else bench
-        case = pulled(true)
-        case = pamrs.Case("bench", bench, case.recordings, Path())
-        found = pamrs.diagnose(case)
+        found = pamrs.diagnose(pulled(true).with_rig(bench))
         assert found.verdict == ("effects" if concealed else "none")
         if concealed:
             assert found.effects[0].id == "muscle_hysteresis"

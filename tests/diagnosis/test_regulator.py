@@ -1,7 +1,10 @@
-"""A regulator with a dead time and limits: as its reference, and diagnosed."""
+"""A regulator with a dead time and limits: as its reference, and diagnosed; one whose outlet has
+no gauge, which is judged with line and chamber by the muscle's gauge.
+"""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,38 +12,19 @@ import pytest
 
 import pamrs
 from pamrs.control.linear import linearise
+from pamrs.diagnosis.fit import acts_in
+from pamrs.effects import Term
 from pamrs.errors import DiagnosisError, ParameterError
-from pamrs.recordings import Recording
-from pamrs.rig import Rig, parse_rig
-from tests.diagnosis.noisy import noisy
-from tests.tables import text_of
+from pamrs.rig import parse_rig
+from pamrs.simulation import core_rig
+from tests.diagnosis.asked import blocks_of, diagnosed
+from tests.diagnosis.stands import LIMITED, ONE_GAUGE, set_in_steps
 
-NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
-TEXT = text_of(__file__, "regulated_limits")
-
-
-def recorded(rig: Rig, role: str, seed: int) -> Recording:
-    """Eight seconds at 200 Hz of steps of the set pressure."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 8.0, 0.005)
-    levels = np.concatenate([[0.5e5], rng.uniform(0.5e5, 6e5, 15)])  # at rest before the log
-    command = levels[(time / 0.5).astype(int)]
-    run = pamrs.simulate(rig, supply_command=command, sample_time=0.005)
-    channels = {"supply_command": command}
-    channels |= {name: run[name] for name in NOISE}
-    return noisy(f"r{seed}", role, 0.005, channels, NOISE, [1, seed])
-
-
-def diagnosed(**true: float) -> pamrs.Diagnosis:
-    nominal = parse_rig(TEXT)
-    rig = nominal.with_parameters({f"supply.{name}": value for name, value in true.items()})
-    roles = ("fit", "fit", "held_out")
-    recordings = [recorded(rig, role, seed) for seed, role in enumerate(roles)]
-    return pamrs.diagnose(pamrs.Case("case", nominal, recordings, Path()))
+RIG = parse_rig(LIMITED)
 
 
 def test_the_outlet_waits_and_then_rises_and_falls_within_its_limits() -> None:
-    rig = parse_rig(TEXT).with_parameters({"supply.dead_time": 0.033})
+    rig = RIG.with_parameters({"supply.dead_time": 0.033})
     command = np.repeat([0.5e5, 6e5, 1e5], 100)
     outlet = pamrs.simulate(rig, supply_command=command, sample_time=0.01)["supply_pressure"]
     assert np.ptp(outlet[:104]) < 1.0
@@ -52,39 +36,28 @@ def test_the_outlet_waits_and_then_rises_and_falls_within_its_limits() -> None:
 
 
 def test_until_the_first_command_arrives_it_holds_what_it_was_set_to() -> None:
-    rig = parse_rig(TEXT).with_parameters({"supply.dead_time": 0.1})
+    rig = RIG.with_parameters({"supply.dead_time": 0.1})
     outlet = pamrs.simulate(rig, supply_command=np.full(40, 4e5), sample_time=0.01)
     assert np.ptp(outlet["supply_pressure"][:11]) < 1e-6
     assert outlet["supply_pressure"][20] > 1.5e5
 
 
 def test_many_runs_give_what_single_ones_do() -> None:
-    nominal = parse_rig(TEXT)
     late = np.array([0.0, 0.012, 0.04])
     command = np.repeat([0.5e5, 6e5], 20)
     values = {"supply.dead_time": late, "supply.rise_limit": np.array([1e12, 1e12, 1e6])}
-    many = pamrs.simulate_batch(
-        nominal,
-        supply_command=np.tile(command, (3, 1)),
-        parameters=values,
-        sample_time=0.01,
-        record=("muscle_pressure",),
-    )
+    given = {"supply_command": np.tile(command, (3, 1)), "parameters": values}
+    many = pamrs.simulate_batch(RIG, **given, sample_time=0.01, record=("muscle_pressure",))
     for k in range(3):
-        rig = nominal.with_parameters({name: float(v[k]) for name, v in values.items()})
-        one = pamrs.simulate(rig, supply_command=command, sample_time=0.01)
-        np.testing.assert_allclose(
-            many["muscle_pressure"][k], one["muscle_pressure"], rtol=1e-9, atol=1e-3
-        )
-
-
-def test_a_healthy_regulator_misses_nothing() -> None:
-    assert diagnosed().verdict == "none"
+        rig = RIG.with_parameters({name: float(v[k]) for name, v in values.items()})
+        one = pamrs.simulate(rig, supply_command=command, sample_time=0.01)["muscle_pressure"]
+        np.testing.assert_allclose(many["muscle_pressure"][k], one, rtol=1e-9, atol=1e-3)
 
 
 def test_a_longer_dead_time_is_told_but_not_from_another_clock() -> None:
     """Pressures that come later than commands come later by either: the data are the same."""
-    found = diagnosed(dead_time=0.03)
+    late_rig = RIG.with_parameters({"supply.dead_time": 0.03})
+    found = diagnosed(RIG, partial(set_in_steps, late_rig))
     first, second, *_ = found.ambiguity
     assert {*first, *second} == {"supply.dead_time", "clock_skew"}
     odds = found.probabilities
@@ -97,23 +70,45 @@ def test_a_longer_dead_time_is_told_but_not_from_another_clock() -> None:
     assert late == pytest.approx([0.025] * len(late), abs=5e-4)
 
 
-def test_a_slower_rise_is_named() -> None:
-    found = diagnosed(rise_limit=1.2e6)
-    assert found.verdict == "parameters"
-    (wrong,) = found.wrong_parameters
-    assert wrong["name"] == "supply.rise_limit"
-    assert wrong["value"] == pytest.approx(1.2e6, rel=0.02)
-
-
 def test_the_gauge_is_compared_with_the_command() -> None:
-    rig = parse_rig(TEXT)
-    wrong = recorded(rig, "fit", 0)
+    wrong = set_in_steps(RIG, "fit", 0)
     wrong.channels["supply_pressure"] *= 10.0
     with pytest.raises(DiagnosisError, match=r"the largest supply_command is 5\.\d+e\+05 Pa"):
-        pamrs.diagnose(pamrs.Case("case", rig, [wrong], Path()))
+        pamrs.diagnose(pamrs.Case("case", RIG, [wrong], Path()))
 
 
 def test_a_linear_model_refuses_a_dead_time() -> None:
-    rig = pamrs.rigs.named("regulated_joint").with_parameters({"supply.dead_time": 0.03})
+    rig = pamrs.rigs.regulated_joint().with_parameters({"supply.dead_time": 0.03})
     with pytest.raises(ParameterError, match=r"supply\.dead_time = 0\.03 is not allowed"):
         linearise(rig, 0.7, held=())
+
+
+JOINT = pamrs.rigs.named("regulated_joint")
+DT = 0.005
+CHANNELS = ("supply_command", *ONE_GAUGE)
+
+
+def test_the_chamber_simulates_a_regulator_that_has_no_gauge() -> None:
+    blocks = blocks_of(JOINT, CHANNELS)
+    assert set(blocks) == {"chamber", "arm"}
+    assert blocks["chamber"].beside == ("supply",)
+    assert blocks["chamber"].covers == "regulator, line and chamber"
+    assert "supply.time_constant" in blocks["chamber"].parameters
+    assert acts_in(Term("supply_regulator_deadband"), blocks["chamber"])
+    assert not acts_in(Term("supply_regulator_deadband"), blocks["arm"])
+    both = blocks_of(JOINT, (*CHANNELS, "supply_pressure"))
+    assert {name: b.beside for name, b in both.items()} == {"supply": (), "chamber": (), "arm": ()}
+
+
+def test_its_prediction_is_that_of_a_simulation() -> None:
+    time = np.arange(0.0, 4.0, DT)
+    command = 2e5 + 6e4 * np.sign(np.sin(3.0 * time))
+    start, given = {"muscle_pressure": 1.5e5, "supply_pressure": 1.5e5}, {"supply_command": command}
+    run = pamrs.simulate(JOINT, **given, sample_time=DT, initial=start)
+    signals = {name: (run[name], np.gradient(run[name], DT)) for name in ONE_GAUGE}
+    lag = ["supply.time_constant"]
+    asked = ("chamber", given, DT, 1e-3, [0], lag, signals, time.size)
+    found, slopes = core_rig(JOINT).predict(*asked)
+    np.testing.assert_allclose(found, run["muscle_pressure"], atol=150.0)
+    assert slopes is not None
+    assert np.abs(slopes[:, 0]).max() > 1e4  # the regulator's lag shows in the muscle

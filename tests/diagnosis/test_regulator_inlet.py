@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 import pamrs
 from pamrs.control.linear import linearise
-from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.prepare import available_blocks
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.experiments import library
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
-from tests.diagnosis.noisy import noisy
+from tests.diagnosis.asked import SETTINGS, blocks_of, diagnosed
+from tests.diagnosis.noisy import driven
 from tests.tables import text_of
 
-SETTINGS = DiagnosisSettings()
 BOTTLE, OUTLET = "supply_pressure.bottle", "supply_pressure.regulator"
 NOISE = {BOTTLE: 400.0, OUTLET: 400.0, "muscle_pressure": 400.0}
 TEXT = text_of(__file__, "bottled")
+RIG = parse_rig(TEXT)
 
 LINED = (
     TEXT.partition("[valve]")[0]
@@ -41,34 +41,18 @@ def recorded(rig: Rig, role: str, seed: int, left_out: tuple[str, ...] = ()) -> 
     time = np.arange(0.0, 16.0, 0.005)
     set_to = np.concatenate([[4e5], rng.uniform(3e5, 6e5, 7)])[(time / 2.0).astype(int)]
     volts = 5.0 + rng.uniform(-4.0, 4.0, 40)[(time / 0.4).astype(int)]
-    run = pamrs.simulate(
-        rig, valve_command=volts, supply_command={"regulator": set_to}, sample_time=0.005
-    )
-    channels = {"valve_command": volts, "supply_command.regulator": set_to}
-    channels |= {name: run[name] for name in NOISE if name not in left_out}
-    noise = {name: level for name, level in NOISE.items() if name in channels}
-    return noisy(f"r{seed}", role, 0.005, channels, noise, [2, seed])
+    commands = {"valve_command": volts, "supply_command.regulator": set_to}
+    noise = {name: level for name, level in NOISE.items() if name not in left_out}
+    return driven(rig, f"r{seed}", role, 0.005, commands, noise, [2, seed])
 
 
-def diagnosed(rig: Rig, *left_out: str) -> pamrs.Diagnosis:
-    roles = ("fit", "fit", "held_out")
-    recordings = [recorded(rig, role, seed, left_out) for seed, role in enumerate(roles)]
-    return pamrs.diagnose(pamrs.Case("case", parse_rig(TEXT), recordings, Path()))
-
-
-def leaking(conductance: float) -> Rig:
-    """The bottle with a leak."""
-    entry = f"""
-[[effects]]
-id = "supply_leak"
-at = "bottle"
-parameters = {{ conductance = {{ value = {conductance!r}, unit = "m3/(s Pa)" }} }}
-"""
-    return parse_rig(TEXT + entry)
+def found_in(rig: Rig, *left_out: str) -> pamrs.Diagnosis:
+    """What is missing in the file of the bottle's rig."""
+    return diagnosed(RIG, partial(recorded, rig, left_out=left_out))
 
 
 def test_a_small_bottle_empties_and_the_outlet_falls_with_it() -> None:
-    rig = parse_rig(TEXT).with_parameters({"supply.bottle.volume": 5e-4})
+    rig = RIG.with_parameters({"supply.bottle.volume": 5e-4})
     run = pamrs.simulate(
         rig,
         valve_command=np.tile(np.repeat([9.0, 1.0], 100), 10),
@@ -85,12 +69,11 @@ def test_a_small_bottle_empties_and_the_outlet_falls_with_it() -> None:
 
 
 def test_each_block_is_driven_by_what_stands_next_to_it() -> None:
-    rig = parse_rig(TEXT)
     commands = ("valve_command", "supply_command.regulator")
 
     def drives(*gauges: str) -> dict[str, set[str]]:
-        have = (*commands, "muscle_pressure", *gauges)
-        return {block.name: set(block.drives) for block in available_blocks(rig, have)}
+        blocks = blocks_of(RIG, (*commands, "muscle_pressure", *gauges))
+        return {name: set(block.drives) for name, block in blocks.items()}
 
     every = drives(BOTTLE, OUTLET)
     assert every == {
@@ -108,39 +91,34 @@ def test_each_block_is_driven_by_what_stands_next_to_it() -> None:
 
 @pytest.mark.parametrize("left_out", [(), (OUTLET,)], ids=["three_gauges", "no_outlet"])
 def test_a_healthy_bottle_and_regulator_miss_nothing(left_out: tuple[str, ...]) -> None:
-    found = diagnosed(parse_rig(TEXT), *left_out)
+    found = found_in(RIG, *left_out)
     assert found.verdict == "none"
     assert not any("in front of it" in text for text in found.warnings)
 
 
 def test_a_bottle_without_a_gauge_is_said_to_stay_as_it_was() -> None:
-    found = diagnosed(parse_rig(TEXT), BOTTLE)
+    found = found_in(RIG, BOTTLE)
     (said,) = [text for text in found.warnings if "in front of it" in text]
     assert said.startswith(f"{BOTTLE} was not recorded: supply.regulator is taken to have")
 
 
 def test_a_line_at_the_regulator_does_not_tell_what_is_drawn() -> None:
     """The noise of two gauges goes both ways through it: a healthy rig would seem to leak."""
-    rig, recordings = parse_rig(LINED), []
-    for seed, role in enumerate(("fit", "fit", "held_out")):
-        rng, at = np.random.default_rng(seed), np.arange(3200) // 100
-        set_to = np.concatenate([[4e5], rng.uniform(1e5, 6e5, 31)])[at]
-        run = pamrs.simulate(
-            rig,
-            supply_command={"regulator": set_to},
-            sample_time=0.005,
-            initial={"muscle_pressure": 4e5},
-        )
-        channels = {"supply_command.regulator": set_to, **{name: run[name] for name in NOISE}}
-        recordings.append(noisy(f"r{seed}", role, 0.005, channels, NOISE, [2, seed]))
-    blocks = available_blocks(rig, tuple(channels))
-    assert [block.name for block in blocks] == ["supply.regulator", "chamber"]
-    assert pamrs.diagnose(pamrs.Case("case", rig, recordings, Path())).verdict == "none"
+    rig, start = parse_rig(LINED), {"muscle_pressure": 4e5}
+
+    def lined(role: str, seed: int) -> Recording:
+        levels = np.random.default_rng(seed).uniform(1e5, 6e5, 31)
+        set_to = {"supply_command.regulator": np.concatenate([[4e5], levels]).repeat(100)}
+        return driven(rig, f"r{seed}", role, 0.005, set_to, NOISE, [2, seed], initial=start)
+
+    blocks = blocks_of(rig, ("supply_command.regulator", *NOISE))
+    assert list(blocks) == ["supply.regulator", "chamber"]
+    assert diagnosed(rig, lined).verdict == "none"
 
 
 @pytest.mark.slow
 def test_a_leak_of_the_bottle_is_named() -> None:
-    found = diagnosed(leaking(3e-11))
+    found = found_in(RIG.with_effect("supply_leak", {"conductance": 3e-11}, at="bottle"))
     assert found.verdict == "effects"
     (effect,) = found.effects
     assert (effect["id"], effect["at"]) == ("supply_leak", "bottle")
@@ -149,26 +127,15 @@ def test_a_leak_of_the_bottle_is_named() -> None:
 
 def test_a_command_above_the_bottle_is_no_error_of_units() -> None:
     """Set to 60 bar it is wide open; an outlet above its bottle is two columns swapped."""
-    rig = parse_rig(TEXT)
-    recording = recorded(rig, "fit", 0)
-    open_wide = np.full_like(recording.channels["valve_command"], 60e5)
-    run = pamrs.simulate(
-        rig,
-        valve_command=recording.channels["valve_command"],
-        supply_command={"regulator": open_wide},
-        sample_time=0.005,
-    )
-    channels = {"valve_command": recording.channels["valve_command"]}
-    channels |= {"supply_command.regulator": open_wide, **{name: run[name] for name in NOISE}}
-    wide = noisy("wide", "fit", 0.005, channels, NOISE, [3, 0])
-    case = pamrs.Case("case", rig, [wide], Path())
-    assert pamrs.diagnose(case).verdict == "none"
-    recording.channels[BOTTLE], recording.channels[OUTLET] = (
-        recording.channels[OUTLET],
-        recording.channels[BOTTLE],
-    )
+    right = recorded(RIG, "fit", 0)
+    volts = right.channels["valve_command"]
+    commands = {"valve_command": volts, "supply_command.regulator": np.full_like(volts, 60e5)}
+    wide = driven(RIG, "wide", "fit", 0.005, commands, NOISE, [3, 0])
+    assert diagnosed(RIG, lambda *_: wide, ("fit",)).verdict == "none"
+    swapped = {BOTTLE: right.channels[OUTLET], OUTLET: right.channels[BOTTLE]}
+    wrong = replace(right, channels=right.channels | swapped)
     with pytest.raises(DiagnosisError, match=r"supply_pressure\.regulator is above .*\.bottle"):
-        pamrs.diagnose(pamrs.Case("case", rig, [recording], Path()))
+        diagnosed(RIG, lambda *_: wrong, ("fit",))
 
 
 def test_experiments_keep_below_the_bottle() -> None:

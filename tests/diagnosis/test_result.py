@@ -1,4 +1,6 @@
-"""Result of a diagnosis: JSON, summary, validation."""
+"""Result of a diagnosis: JSON, summary, validation; what is read from its file is what was
+written.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,10 @@ import jsonschema
 import numpy as np
 import pytest
 
+import pamrs
 from pamrs.diagnosis.result import Diagnosis, Trace, schema
 from pamrs.diagnosis.schema import FILE, is_current
+from pamrs.errors import DiagnosisError
 from pamrs.findings import (
     BlockVerdict,
     Condition,
@@ -27,8 +31,12 @@ from pamrs.report import text as words
 from tests.diagnosis import synthetic
 from tests.tables import rows_of
 
+MADE = pytest.mark.parametrize(
+    "make", [synthetic.diagnosis, synthetic.sealed_chamber, synthetic.nothing]
+)
 
-@pytest.mark.parametrize("make", [synthetic.diagnosis, synthetic.sealed_chamber, synthetic.nothing])
+
+@MADE
 def test_json_follows_schema(make, tmp_path: Path) -> None:
     jsonschema.Draft202012Validator.check_schema(schema())
     path = tmp_path / "out.json"
@@ -42,11 +50,8 @@ def test_json_follows_schema(make, tmp_path: Path) -> None:
 
 def test_schema_is_closed() -> None:
     content = synthetic.diagnosis().to_dict()
-    for change in (
-        {"extra": 1},
-        {"verdict": "perhaps"},
-        {"where": {**content["where"], "extra": 1}},
-    ):
+    inside = {"where": {**content["where"], "extra": 1}}
+    for change in ({"extra": 1}, {"verdict": "perhaps"}, inside):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**content, **change}, schema())
 
@@ -64,14 +69,10 @@ def test_not_finite_becomes_null() -> None:
 
 
 def test_numpy_values_become_json() -> None:
-    where = {
-        "block": "arm",
-        "intervals": np.array([[0.0, 1.0]]).tolist(),
-        "conditions": [Condition("time", float(np.float32(0.5)), 0.25, 1.0, "late")],
-    }
-    content = json.loads(
-        synthetic.diagnosis(where=where, probabilities={"none": np.float64(0.25)}).to_json()
-    )
+    condition = Condition("time", np.float64(0.5), 0.25, 1.0, "late")
+    where = {"block": "arm", "intervals": [[0.0, 1.0]], "conditions": [condition]}
+    found = synthetic.diagnosis(where=where, probabilities={"none": np.float64(0.25)})
+    content = json.loads(found.to_json())
     told = {"name": "time", "share": 0.5, "time": 0.25, "mean": 1.0, "text": "late"}
     assert content["where"]["conditions"] == [told]
     assert content["probabilities"] == {"none": 0.25}
@@ -106,32 +107,25 @@ def test_a_plain_number_stands_without_its_unit() -> None:
 
 def test_an_instruction_that_pairs_share_is_given_once() -> None:
     what = "For the chamber of flexor: step the pressure by two sizes and watch for 4 s"
-    own = NextExperiment(
-        f"{what}; what fades is heat.",
-        pairs=[
-            PairExperiment(["unlisted", "leak_muscle"], f"{what}. A model with a leak says it."),
-            PairExperiment(
-                ["unlisted", "sensors.flexor.pressure_zero"], "Measure it by itself with a gauge."
-            ),
-        ],
-    )
+    zero = ["unlisted", "sensors.flexor.pressure_zero"]
+    pairs = [
+        PairExperiment(["unlisted", "leak_muscle"], f"{what}. A model with a leak says it."),
+        PairExperiment(zero, "Measure it by itself with a gauge."),
+    ]
+    own = NextExperiment(f"{what}; what fades is heat.", pairs=pairs)
     found = dataclasses.replace(synthetic.diagnosis(), next_experiment=own)
     summary = " ".join(found.summary().split())
     assert summary.count("watch for 4 s") == 1
-    assert (
-        "effect outside the catalogue or muscle leak? The same experiment. A model with a leak"
-        in summary
-    )
+    same = "effect outside the catalogue or muscle leak? The same experiment. A model with a leak"
+    assert same in summary
     assert "or wrong pressure zero of flexor? Measure it by itself" in summary
-    html = render_html(found)
-    assert html.count("watch for 4 s") == 1
+    assert render_html(found).count("watch for 4 s") == 1
 
 
 def test_errors_of_a_block_with_a_name_have_their_unit() -> None:
     found = synthetic.diagnosis()
-    errors = dataclasses.replace(
-        found.fit, held_out={"joint_angle.elbow": found.fit.held_out["joint_angle"]}
-    )
+    named = {"joint_angle.elbow": found.fit.held_out["joint_angle"]}
+    errors = dataclasses.replace(found.fit, held_out=named)
     lines = dataclasses.replace(found, fit=errors).summary().splitlines()
     assert any(line.startswith("joint_angle.elbow [deg]") for line in lines)
 
@@ -151,23 +145,13 @@ ARM = {"blocks": ["arm"], "ambiguity": [], "wrong_parameters": [], "effects": []
 def _judged(verdict: str, probabilities: dict[str, float], **more: Any) -> Diagnosis:
     """A result of one group of blocks."""
     block = BlockVerdict(verdict=verdict, probabilities=probabilities, **(ARM | more))
-    effects = [
-        {
-            "id": name,
-            "probability": sum(p for key, p in probabilities.items() if name in key.split("+")),
-            "parameters": {},
-        }
-        for name in block.effects
-    ]
-    return synthetic.diagnosis(
-        verdict=verdict,
-        probabilities=probabilities,
-        effects=effects,
-        ambiguity=block.ambiguity,
-        blocks=[block],
-        where={"block": "arm"},
-        traces=[],
-    )
+    effects = []
+    for name in block.effects:
+        chance = sum(p for key, p in probabilities.items() if name in key.split("+"))
+        effects.append({"id": name, "probability": chance, "parameters": {}})
+    case = {"verdict": verdict, "probabilities": probabilities, "ambiguity": block.ambiguity}
+    more = {"blocks": [block], "where": {"block": "arm"}, "traces": []}
+    return synthetic.diagnosis(effects=effects, **case, **more)
 
 
 @pytest.mark.parametrize(
@@ -227,3 +211,57 @@ def test_format_uncertain() -> None:
     assert words.format_uncertain(41.27, 2.2) == "41.3 ± 2.2"
     assert words.format_uncertain(2.0, None) == "2.000"
     assert words.format_probability(0.9999) == "> 0.99"
+
+
+@MADE
+def test_what_was_written_is_read(make, tmp_path: Path) -> None:
+    made = make()
+    written = made.to_json(tmp_path / "result.json")
+    read = pamrs.load_result(tmp_path)
+    assert isinstance(read, pamrs.Diagnosis)
+    assert read.to_json() == written
+    assert read == pamrs.load_result(tmp_path / "result.json") == made
+    assert (read.case, read.text, repr(read)) == (made.case, made.text, repr(made))
+    assert read.summary() == made.summary()
+    assert made._repr_html_().startswith(read._repr_html_())  # behind it, a picture
+    assert [type(one) for one in read.effects] == [type(one) for one in made.effects]
+    assert [one.name for one in read.effects] == [one.name for one in made.effects]
+
+
+def test_what_a_file_does_not_keep_says_what_to_do(tmp_path: Path) -> None:
+    synthetic.diagnosis().to_json(tmp_path / "result.json")
+    read = pamrs.load_result(tmp_path)
+    with pytest.raises(DiagnosisError, match="rig is not kept .* --model wrote"):
+        _ = read.rig
+    with pytest.raises(DiagnosisError, match="run pamrs.diagnose on the case again"):
+        read.report(tmp_path / "report.html")
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"schema": "pamrs.diagnosis/9"}, "'pamrs.diagnosis/9' is not allowed: pamrs.diagnosis/1"),
+        ({"verdict": "maybe"}, "verdict is 'maybe'"),
+        ({"effects": [{"probability": 0.5}]}, "is no complete result"),
+        ({"effects": 3}, "is no complete result"),
+        ({"where": [1]}, "is no complete result"),
+        ({"settings": {"speed": 1}}, "settings has 'speed'"),
+    ],
+)
+def test_what_is_no_result_is_named(change, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "result.json"
+    file.write_text(json.dumps(json.loads(synthetic.diagnosis().to_json()) | change))
+    with pytest.raises(DiagnosisError, match=said):
+        pamrs.load_result(file)
+
+
+def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DiagnosisError, match=r"result\.json: cannot be read"):
+        pamrs.load_result(tmp_path)
+    (tmp_path / "result.json").write_text("[1, 2")
+    with pytest.raises(DiagnosisError, match="is not the JSON of a result"):
+        pamrs.load_result(tmp_path)
+    (tmp_path / "result.json").write_text("[1, 2]")
+    with pytest.raises(DiagnosisError, match="schema = None"):
+        pamrs.load_result(tmp_path)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -15,40 +14,33 @@ import pytest
 
 import pamrs
 from pamrs import report
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import BlockGroup, Candidate, drop_undetermined, judge, put_aside
 from pamrs.diagnosis.fit import Events, Problem, fit, known_parameters, residuals
 from pamrs.diagnosis.model import _conclude, _free_run
 from pamrs.diagnosis.model._free_run import _OFF_NOISES
 from pamrs.diagnosis.next_experiment._asked import _telling, next_to_record
-from pamrs.diagnosis.prepare import available_blocks, prepare, unjudged_blocks
+from pamrs.diagnosis.prepare import unjudged_blocks
 from pamrs.diagnosis.result import schema
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
 from pamrs.experiments import experiments_of
-from pamrs.findings import (
-    BlockVerdict,
-    BudgetTerm,
-    FreeRun,
-    FreeRunError,
-)
+from pamrs.findings import BlockVerdict, BudgetTerm, FreeRun, FreeRunError
 from pamrs.report import text as words
-from pamrs.simulation import core_rig
+from tests.diagnosis.asked import SETTINGS, blocks_of, diagnosed, problem_of
 from tests.diagnosis.terms import by_text, of_texts, terms
 from tests.diagnosis.test_assemble import NAMES, recorded
 from tests.report.test_words import group, seen, stages
 
 LEAK = terms("leak_muscle")
-SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
 
 
 def found_without(true: pamrs.Rig, leave_out: str) -> pamrs.diagnosis.Diagnosis:
     """The diagnosis of two logs of a shoulder that lack a channel."""
-    roles = ("fit", "held_out")
-    records = [
-        recorded(true, f"r{k}", role, leave_out=leave_out, seed=k) for k, role in enumerate(roles)
-    ]
-    return pamrs.diagnose(pamrs.Case("lacking", RIG, records, Path()))
+
+    def one(role: str, k: int) -> pamrs.Recording:
+        return recorded(true, f"r{k}", role, leave_out=leave_out, seed=k)
+
+    return diagnosed(RIG, one, ("fit", "held_out"))
 
 
 def test_blocks_that_were_not_judged_are_said_everywhere() -> None:
@@ -75,11 +67,7 @@ def test_blocks_that_were_not_judged_are_said_everywhere() -> None:
 def test_every_block_of_a_full_log_is_judged() -> None:
     assert unjudged_blocks(RIG, NAMES) == []
     lacking = tuple(name for name in NAMES if name != "joint_angle")
-    assert [b.name for b in unjudged_blocks(RIG, lacking)] == [
-        "supply",
-        "chamber",
-        "arm",
-    ]
+    assert [b.name for b in unjudged_blocks(RIG, lacking)] == ["supply", "chamber", "arm"]
 
 
 @pytest.mark.parametrize(
@@ -126,9 +114,7 @@ def test_a_free_run_beyond_what_is_known_of_the_values_is_off(strength: float, o
         {n: RIG.parameter(n).value + far * RIG.parameter(n).tol for n, far in moved.items()}
     )
     true = true.with_effect("leak_muscle", {"conductance": strength}) if strength else true
-    prepared = prepare(recorded(true, "a", "fit"), RIG, SETTINGS)
-    blocks = available_blocks(RIG, NAMES)
-    problem = Problem(blocks, [prepared], core_rig(RIG), SETTINGS)
+    problem = problem_of(RIG, [recorded(true, "a", "fit")])
     own = residuals(problem, RIG)
     runs, *_ = _free_run.free_run(
         problem, {"before": own, "after": own}, RIG, RIG, None, known_of(RIG)
@@ -160,13 +146,10 @@ def test_nothing_is_settled_while_the_whole_rig_is_off() -> None:
 
 
 def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
-    prepared = prepare(recorded(RIG, "a", "fit"), RIG, SETTINGS)
-    blocks = available_blocks(RIG, NAMES)
-    chamber = next(b for b in blocks if b.name == "chamber")
-    problem = Problem(blocks, [prepared], core_rig(RIG), SETTINGS)
-    base = Candidate(
-        (), fit(problem, RIG, (), {}, dict.fromkeys(("supply", "chamber", "arm"), 1.0)), {}, {}, 0.0
-    )
+    problem = problem_of(RIG, [recorded(RIG, "a", "fit")])
+    blocks = problem.blocks
+    white = dict.fromkeys(("supply", "chamber", "arm"), 1.0)
+    base = Candidate((), fit(problem, RIG, (), {}, white), {}, {}, 0.0)
     quiet = judge([BlockGroup(blocks, {}, {}, [base], {UNDECIDED: 1.0}, None, {}, [])], SETTINGS)
 
     def told(problem: Problem, *off: str) -> str:
@@ -175,21 +158,19 @@ def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
     assert told(problem).startswith("The answer is settled")
     # a block that has the channel is asked, without one what surrounds it
     assert "no judged block shows why. For the chamber: step" in told(problem, "muscle_pressure")
-    few = replace(problem, blocks=[b for b in blocks if b is not chamber])
+    few = replace(problem, blocks=[b for b in blocks if b.name != "chamber"])
     assert "record the channels between it" in told(few, "muscle_pressure")
 
 
 def test_what_may_leak_is_shut_in_inside_the_pressures_that_were_recorded() -> None:
-    blocks = available_blocks(RIG, NAMES)
-    (chamber,) = (b for b in blocks if b.name == "chamber")
+    chamber = blocks_of(RIG, NAMES)["chamber"]
     assert _telling(chamber, RIG).kind == "step_and_shut"
     assert _telling(chamber, RIG, terms("pressure_lag")).kind == "step_and_shut"
     leak = _telling(chamber, RIG, terms("leak_muscle"))
     assert leak.kind == "sealed_hold"
     assert "inside those that are already recorded" in leak.text
     record = recorded(RIG, "a", "fit")
-    own = SETTINGS
-    (hold,) = experiments_of(RIG, [record], own, ["sealed_hold"])
+    (hold,) = experiments_of(RIG, [record], SETTINGS, ["sealed_hold"])
     run = hold.simulate(RIG)
     assert run["muscle_pressure"].max() < 1.02 * record.channels["muscle_pressure"].max()
 
@@ -235,9 +216,8 @@ def test_shares_that_cancel_are_told_together() -> None:
 def leak_group(strength: float) -> tuple[Problem, BlockGroup]:
     """A chamber's group with the leak that its log has, fitted, and a companion beside it."""
     true = RIG.with_effect("leak_muscle", {"conductance": strength})
-    prepared = prepare(recorded(true, "all", "fit"), RIG, SETTINGS)
-    (chamber,) = [b for b in available_blocks(RIG, NAMES) if b.name == "chamber"]
-    problem = Problem([chamber], [prepared], core_rig(RIG), SETTINGS)
+    problem = problem_of(RIG, [recorded(true, "all", "fit")], "chamber")
+    (chamber,) = problem.blocks
     free = {"leak_muscle.conductance": strength}
     base = fit(problem, RIG, (), {}, {"chamber": 1.0})
     found = fit(problem, RIG, LEAK, free, {"chamber": 1.0})
@@ -283,30 +263,25 @@ def test_a_wrong_value_that_is_not_determined_is_no_name_in_noise(
         lambda problem, found: {name: std * tolerance},
     )
     wrong = replace(base, fit=moved, wrong=(name,))
-    group = replace(
-        own,
-        candidates=[base, wrong],
-        probabilities={wrong.hypothesis: 0.9, UNDECIDED: 0.1},
-        mismatch=None,
-    )
-    left = drop_undetermined(group, problem).probabilities
+    chances = {wrong.hypothesis: 0.9, UNDECIDED: 0.1}
+    near = replace(own, candidates=[base, wrong], probabilities=chances, mismatch=None)
+    left = drop_undetermined(near, problem).probabilities
     assert left == pytest.approx({wrong.hypothesis: kept, UNDECIDED: 1.0 - kept})
 
 
 def test_events_of_another_effect_determine_no_value() -> None:
     problem, own = leak_group(1e-13)
     leak = own.candidates[1]
-    happened = Events(
-        Term("external_torque"), {problem.recordings[0].recording.name: {"torque": 1.0}}
-    )
-    beside = replace(leak, fit=replace(leak.fit, events=happened))
-    after = drop_undetermined(replace(own, candidates=[own.candidates[0], beside]), problem)
-    assert after.probabilities[Hypothesis(LEAK)] == pytest.approx(0.45)
+
+    def left(effect: str) -> dict[Hypothesis, float]:
+        happened = Events(Term(effect), {"all": {"torque": 1.0}})
+        beside = replace(leak, fit=replace(leak.fit, events=happened))
+        group = replace(own, candidates=[own.candidates[0], beside])
+        return drop_undetermined(group, problem).probabilities
+
+    assert left("external_torque")[Hypothesis(LEAK)] == pytest.approx(0.45)
     # what happened itself is known by its times
-    happened = replace(happened, effect=Term("leak_muscle"))
-    beside = replace(leak, fit=replace(leak.fit, events=happened))
-    after = drop_undetermined(replace(own, candidates=[own.candidates[0], beside]), problem)
-    assert after.probabilities == own.probabilities
+    assert left("leak_muscle") == own.probabilities
 
 
 def test_a_name_that_spoils_a_channel_is_put_aside() -> None:

@@ -20,26 +20,16 @@ ROOT = Path(__file__).parents[2]
 DIAGNOSIS = ROOT / "python/pamrs/diagnosis"
 
 
-def sealed_case(conductance: float = 3e-11) -> pamrs.Case:
-    return held(conductance, 60.0)
-
-
 def numbers(tree: ast.Module) -> dict[str, ast.stmt]:
     """Statements that give a name of a module a number, or a collection with a number in it."""
     found: dict[str, ast.stmt] = {}
     for statement in tree.body:
-        if isinstance(statement, ast.Assign):
-            targets, value = statement.targets, statement.value
-        elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
-            targets, value = [statement.target], statement.value
-        else:
+        value = getattr(statement, "value", None)
+        if not isinstance(statement, (ast.Assign, ast.AnnAssign)) or value is None:
             continue
-        constants = [
-            n
-            for n in ast.walk(value)
-            if isinstance(n, ast.Constant) and type(n.value) in (int, float)
-        ]
-        if constants and not isinstance(value, ast.Subscript):
+        constants = [n.value for n in ast.walk(value) if isinstance(n, ast.Constant)]
+        if {int, float} & set(map(type, constants)) and not isinstance(value, ast.Subscript):
+            targets = getattr(statement, "targets", None) or [statement.target]
             names = [n for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)]
             found |= {n.id: statement for n in names}
     return found
@@ -48,13 +38,8 @@ def numbers(tree: ast.Module) -> dict[str, ast.stmt]:
 def without_reason(text: str) -> list[str]:
     """Numbers of a module with no comment behind, above or text below them."""
     tree, lines = ast.parse(text), text.splitlines()
-    texts = {
-        n.lineno
-        for n in tree.body
-        if isinstance(n, ast.Expr)
-        and isinstance(n.value, ast.Constant)
-        and isinstance(n.value.value, str)
-    }
+    alone = (n for n in tree.body if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant))
+    texts = {n.lineno for n in alone if isinstance(n.value.value, str)}
     return [
         name
         for name, own in numbers(tree).items()
@@ -75,19 +60,11 @@ def test_every_number_of_a_module_has_its_reason() -> None:
 
 def test_no_function_reads_a_default() -> None:
     """Whoever needs settings is given them; only what a user calls makes the published ones."""
-    makers = {
-        "__init__.py",
-        "result.py",
-        "next_experiment/_choice.py",
-        "next_experiment/_planning.py",
-    }
+    asked = ("next_experiment/_choice.py", "next_experiment/_planning.py")
+    makers = {"__init__.py", "result.py", *asked}
     for path in sorted(DIAGNOSIS.rglob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        calls = {
-            n.func.id
-            for n in ast.walk(tree)
-            if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
-        }
+        calls = {getattr(n.func, "id", "") for n in ast.walk(tree) if isinstance(n, ast.Call)}
         inside = path.relative_to(DIAGNOSIS).as_posix()
         assert "DiagnosisSettings" not in calls or inside in makers, inside
 
@@ -145,7 +122,7 @@ def test_what_is_not_allowed_is_named(values: dict[str, object], message: str) -
 
 
 def test_a_setting_that_changes_changes_the_outcome_and_is_kept() -> None:
-    case = sealed_case()
+    case = held(3e-11, 60.0)
     usual = pamrs.diagnose(case)
     assert usual.verdict == "effects"
     assert usual.settings == DiagnosisSettings()
@@ -157,30 +134,18 @@ def test_a_setting_that_changes_changes_the_outcome_and_is_kept() -> None:
     assert other.verdict == "unlisted"
     assert max(other.probabilities["leak_muscle"], 0.0) <= 0.4 < usual.probabilities["leak_muscle"]
     told = json.loads(other.to_json())["settings"]
-    assert (
-        told
-        == {"most_probability": 0.3, "drift_probability": 0.2, "named": 0.45}
-        == {name: getattr(cautious, name) for name in told}
-    )
+    assert told == {"most_probability": 0.3, "drift_probability": 0.2, "named": 0.45}
     assert DiagnosisSettings.from_dict(told) == other.settings == cautious
 
 
 def words(path: Path) -> list[tuple[int, str]]:
     """Every text in the code of a module, docstrings left out."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    docs = {
-        id(node.body[0].value)
-        for node in ast.walk(tree)
-        if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef))
-        and node.body
-        and isinstance(node.body[0], ast.Expr)
-    }
-    own = [
-        n
-        for n in ast.walk(tree)
-        if isinstance(n, ast.Constant) and isinstance(n.value, str) and id(n) not in docs
-    ]
-    return [(n.lineno, n.value) for n in own]
+    documented = (ast.Module, ast.FunctionDef, ast.ClassDef)
+    first = [n.body[0] for n in ast.walk(tree) if isinstance(n, documented) and n.body]
+    docs = {id(n.value) for n in first if isinstance(n, ast.Expr)}
+    own = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and id(n) not in docs]
+    return [(n.lineno, n.value) for n in own if isinstance(n.value, str)]
 
 
 @pytest.mark.parametrize("package", ["diagnosis", "report", "findings"])

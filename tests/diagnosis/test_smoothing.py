@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from pamrs.diagnosis.prepare._signals import filter_length, lengths_of, smoothed
-from pamrs.diagnosis.settings import DiagnosisSettings
+from tests.diagnosis.asked import SETTINGS
 
-PREPARE = DiagnosisSettings()
 DT = 0.005
 TIME = DT * np.arange(4000)
-FULL = np.full(TIME.size, filter_length(DT, PREPARE), dtype=np.intp)
+FULL = np.full(TIME.size, filter_length(DT, SETTINGS), dtype=np.intp)
 
 
 def noisy(values: np.ndarray, size: float, seed: int = 0) -> np.ndarray:
@@ -21,29 +20,29 @@ def noisy(values: np.ndarray, size: float, seed: int = 0) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_alone_seldom_shortens_it(seed: int) -> None:
     smooth = 1e5 * np.sin(2.0 * np.pi * 0.5 * TIME)
-    lengths = lengths_of(noisy(smooth, 400.0, seed), 400.0, DT, PREPARE)
-    assert set(np.unique(lengths)) <= {1, 7, filter_length(DT, PREPARE)}
-    assert np.mean(lengths < filter_length(DT, PREPARE)) < 0.01
+    lengths = lengths_of(noisy(smooth, 400.0, seed), 400.0, DT, SETTINGS)
+    assert set(np.unique(lengths)) <= {1, 7, filter_length(DT, SETTINGS)}
+    assert np.mean(lengths < filter_length(DT, SETTINGS)) < 0.01
 
 
 def test_a_corner_is_followed_and_the_rest_is_smoothed() -> None:
     true = 5e5 - 4e5 * np.exp(-np.mod(TIME, 1.0) / 0.1)  # filled in 0.1 s, emptied at once
     found = noisy(true, 400.0)
-    lengths = lengths_of(found, 400.0, DT, PREPARE)
+    lengths = lengths_of(found, 400.0, DT, SETTINGS)
     near = np.mod(TIME + 0.03, 1.0) < 0.06
     adapted, _ = smoothed(found, DT, lengths)
     fixed, _ = smoothed(found, DT, FULL)
     off = np.abs(adapted - true)
     assert off[near].max() < 0.02 * np.abs(fixed - true)[near].max()
     far = np.mod(TIME - 0.1, 1.0) < 0.8
-    assert np.mean(lengths[far] == filter_length(DT, PREPARE)) > 0.95
+    assert np.mean(lengths[far] == filter_length(DT, SETTINGS)) > 0.95
     assert np.std((adapted - true)[far]) < 0.6 * 400.0
 
 
 def test_hum_is_not_a_corner() -> None:
     hum = 4000.0 * np.sin(2.0 * np.pi * 60.0 * TIME)
-    lengths = lengths_of(noisy(hum, 400.0), 400.0, DT, PREPARE)
-    assert np.mean(lengths == filter_length(DT, PREPARE)) > 0.95
+    lengths = lengths_of(noisy(hum, 400.0), 400.0, DT, SETTINGS)
+    assert np.mean(lengths == filter_length(DT, SETTINGS)) > 0.95
 
 
 def test_each_sample_is_that_of_its_filter() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
@@ -29,11 +30,8 @@ def coloured(rng: np.random.Generator, memory: float) -> Array:
     if not memory:
         return white
     keep = np.exp(-DT / memory)
-    out = np.empty_like(white)
-    out[0] = white[0]
-    for k in range(1, TIME.size):
-        out[k] = keep * out[k - 1] + np.sqrt(1.0 - keep**2) * white[k]
-    return out
+    white[1:] *= np.sqrt(1.0 - keep**2)
+    return lfilter([1.0], [1.0, -keep], white)
 
 
 def fitted(noise: Array, shapes: Array = SHAPES) -> tuple[Problem, Fit, Array]:
@@ -49,17 +47,10 @@ def fitted(noise: Array, shapes: Array = SHAPES) -> tuple[Problem, Fit, Array]:
     block = SimpleNamespace(name="arm")
     loose: Any = SimpleNamespace
     problem = loose(blocks=[block], recordings=[prepared], settings=DiagnosisSettings())
-    found = Fit(
-        (),
-        loose(),
-        dict(zip(names, value.tolist(), strict=True)),
-        std,
-        covariance,
-        0.0,
-        {("arm", "r"): residual},
-        scales=dict.fromkeys(names, 1.0),
-        inflation={"arm": 1.0},
-    )
+    values = dict(zip(names, value.tolist(), strict=True))
+    more = {"scales": dict.fromkeys(names, 1.0), "inflation": {"arm": 1.0}}
+    kept = {("arm", "r"): residual}
+    found = Fit((), loose(), values, std, covariance, 0.0, kept, **more)
     return problem, found, value
 
 

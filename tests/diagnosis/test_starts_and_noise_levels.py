@@ -5,16 +5,14 @@ it scatters.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import t
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Candidate, Weighing, significant, weigh
-from pamrs.diagnosis.fit import Fit, Problem, residuals
+from pamrs.diagnosis.fit import Problem, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import (
     Prepared,
@@ -24,13 +22,11 @@ from pamrs.diagnosis.prepare import (
     noise_level,
     prepare,
 )
-from pamrs.effects import Term
 from pamrs.simulation import core_rig
-from tests.diagnosis.likelihoods import leaving
-from tests.diagnosis.noisy import whole
-from tests.diagnosis.terms import by_text, terms
-
-SETTINGS = DiagnosisSettings()
+from tests.diagnosis.asked import SETTINGS, blocks_of
+from tests.diagnosis.likelihoods import made_up
+from tests.diagnosis.noisy import noisy
+from tests.diagnosis.terms import by_text
 
 DT, ROWS = 0.005, 1600
 NOISE = {
@@ -48,17 +44,10 @@ def recorded(seed: int, angle: np.ndarray | None = None) -> Prepared:
     """
     time = DT * np.arange(ROWS)
     run = pamrs.simulate(RIG, 5.0 + 0.1 * np.sin(0.5 * time) ** 2, sample_time=DT)
-    rng = np.random.default_rng(seed)
-    channels = {
-        n: (angle if n == "joint_angle" and angle is not None else run[n])
-        + rng.normal(0.0, s, ROWS)
-        for n, s in NOISE.items()
-    }
-    return prepare(
-        whole(f"slow{seed}", "fit", DT, channels),
-        RIG,
-        SETTINGS,
-    )
+    channels = {n: run[n] for n in NOISE}
+    if angle is not None:
+        channels["joint_angle"] = angle
+    return prepare(noisy(f"slow{seed}", "fit", DT, channels, NOISE, [seed]), RIG, SETTINGS)
 
 
 def slopes_at_first(path: np.ndarray) -> tuple[float, float]:
@@ -146,37 +135,27 @@ def test_noise_exceeds_its_limit_as_seldom_however_it_scatters(scatter: float) -
         assert seldom == pytest.approx(SETTINGS.noise_chance)
 
 
-def named(
-    effects: tuple[Term, ...], ratio: float, values: dict[str, float], scatter: float = 0.05
-) -> Candidate:
-    """A set of effects that leaves so many times the noise level."""
+def named(effect: str, ratio: float, scatter: float = 0.05, **values: float) -> Candidate:
+    """An effect, or none, that leaves so many times the noise level."""
     left = {"arm": Excess(ratio, 0.0, 0.5, 1.0, 1.0, 1.1 * np.exp(2.6 * scatter), scatter)}
-    fit = Fit(effects, RIG, values, {}, np.zeros((0, 0)), 0.0, {}, {}, 1, {}, None)
-    return Candidate(effects, fit, left, left, 0.0, likelihood=leaving(left))
+    named = {f"{effect}.{name}": value for name, value in values.items()}
+    return made_up(RIG, effect, left, named)
 
 
-def weighed(*given: Any) -> dict[str, float]:
-    """Probabilities by the text of each hypothesis."""
-    return by_text(weigh(*given))
+def weighed(*given: Candidate) -> dict[str, float]:
+    """Probabilities by the text of each hypothesis of the arm."""
+    arm = [blocks_of(RIG, NOISE)["arm"]]
+    return by_text(weigh(given, arm, Weighing(0.985, 30.0, SETTINGS)))
 
 
 def test_of_a_mismatch_near_the_noise_the_noise_says_how_much_may_be_left() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
-    start, right, wrong = (
-        named((), 1.4, {}),
-        named(terms("leak_muscle"), 1.0, {}),
-        named(terms("supply_leak"), 1.25, {}),
-    )
-    odds = weighed([start, right, wrong], blocks, Weighing(0.985, 30.0, SETTINGS))
+    odds = weighed(named("", 1.4), named("leak_muscle", 1.0), named("supply_leak", 1.25))
     assert odds["leak_muscle"] > 20.0 * odds["supply_leak"]
 
 
 def test_what_is_still_more_than_noise_is_not_explained() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
-
     def chances(before: float, left: float) -> dict[str, float]:
-        found = [named((), before, {}), named(terms("leak_muscle"), left, {})]
-        return weighed(found, blocks, Weighing(0.985, 30.0, SETTINGS))
+        return weighed(named("", before), named("leak_muscle", left))
 
     assert chances(1.4, 1.27)["leak_muscle"] < 0.5
     assert chances(1.4, 1.1)["leak_muscle"] > 0.7
@@ -194,16 +173,8 @@ def test_every_joint_of_an_arm_starts_where_it_was() -> None:
         if n.startswith(("joint_angle", "muscle_pressure", "supply_pressure"))
     }
     channels |= {n: np.full(ROWS, 5.0) for n in core_rig(rig).inputs}
-    rng = np.random.default_rng(0)
-    channels = {
-        n: v + rng.normal(0.0, 4e-4 if n.startswith("joint") else 100.0, ROWS)
-        for n, v in channels.items()
-    }
-    prepared = prepare(
-        whole("rest", "fit", DT, channels),
-        rig,
-        SETTINGS,
-    )
+    noise = {n: 4e-4 if n.startswith("joint") else 100.0 for n in channels}
+    prepared = prepare(noisy("rest", "fit", DT, channels, noise, [0]), rig, SETTINGS)
     arms = [b for b in available_blocks(rig, tuple(channels)) if b.kind == "arm"]
     assert len(arms) == 2
     for block in arms:
@@ -247,35 +218,23 @@ def test_few_samples_have_a_noise_too(samples: int) -> None:
 
 
 def test_a_value_that_nobody_has_published_costs_odds() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
-    start, rival = (
-        named((), 3.0, {}),
-        named(terms("base_flexibility"), 1.0, {"base_flexibility.natural_frequency": 7.0}),
-    )
+    start, rival = named("", 3.0), named("base_flexibility", 1.0, natural_frequency=7.0)
     for length, least, most in ((0.3, 0.5, 2.0), (0.005, 10.0, 60.0)):
-        odds = weighed(
-            [start, rival, named(terms("payload_swing"), 1.0, {"payload_swing.length": length})],
-            blocks,
-            Weighing(0.985, 30.0, SETTINGS),
-        )
+        odds = weighed(start, rival, named("payload_swing", 1.0, length=length))
         assert least < odds["base_flexibility"] / odds["payload_swing"] < most
 
 
 def test_what_relaxes_at_once_is_another_stiffness() -> None:
     """A time constant below its own standard deviation was not seen: the wrong value wins."""
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
-    start = named((), 400.0, {})
-    value = replace(named((), 1.02, {}), wrong=("muscle.modulus_scale",))
-    moved = {"muscle.modulus_scale": -10.0}
-    at, scales = {"muscle.modulus_scale": 0.7}, {"muscle.modulus_scale": 0.03}
-    freed = replace(value.fit, values=at, scales=scales, moved=moved, freed=tuple(moved))
-    value = replace(value, fit=freed)
-    creep = named(terms("muscle_creep"), 1.0, {"muscle_creep.time_constant": 2.0})
+    name, start = "muscle.modulus_scale", named("", 400.0)
+    known = {"moved": {name: -10.0}, "scales": {name: 0.03}}
+    value = made_up(RIG, name, named("", 1.02).fitted, {name: 0.7}, **known)
+    creep = named("muscle_creep", 1.0, time_constant=2.0)
 
     def odds(std: float) -> dict[str, float]:
         told = replace(creep, fit=replace(creep.fit, std={"muscle_creep.time_constant": std}))
-        return weighed([start, told, value], blocks, Weighing(0.985, 30.0, SETTINGS))
+        return weighed(start, told, value)
 
     seen, unseen = odds(0.2), odds(3.0)
     assert seen["muscle_creep"] > 0.8
-    assert unseen["muscle.modulus_scale"] > 0.8
+    assert unseen[name] > 0.8

@@ -5,35 +5,27 @@ rest: what healthy rigs were given names for.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.noise import noise_levels
-from pamrs.diagnosis.prepare import (
-    Prepared,
-    available_blocks,
-    begun_alike,
-    predicted,
-    prepare,
-    residual,
-)
+from pamrs.diagnosis.prepare import Prepared, begun_alike, predicted, residual
 from pamrs.simulation import core_rig
+from tests.diagnosis.asked import problem_of
 from tests.diagnosis.healthy import healthy_case
 
-SETTINGS = DiagnosisSettings()
 SHAPES = ["muscle.flexor.rest_length", "transmission.extensor.radius"]
 
 
 def judged(case: pamrs.Case, kind: str) -> Problem:
     """The blocks of a kind over the recordings of a case to fit."""
-    ready = [prepare(r, case.rig, SETTINGS) for r in case.recordings if r.role == "fit"]
-    blocks = available_blocks(case.rig, tuple(case.recordings[0].channels))
-    return Problem([b for b in blocks if b.kind == kind], ready, core_rig(case.rig), SETTINGS)
+    every = problem_of(case.rig, [r for r in case.recordings if r.role == "fit"])
+    return replace(every, blocks=[b for b in every.blocks if b.kind == kind])
 
 
 @pytest.fixture(scope="module")

@@ -9,37 +9,26 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings, evidence
-from pamrs.diagnosis.evidence import (
-    BlockGroup,
-    Candidate,
-    Judged,
-    case_verdict,
-    judge,
-)
-from pamrs.diagnosis.fit import Fit
+from pamrs.diagnosis import evidence
+from pamrs.diagnosis.evidence import BlockGroup, Candidate, Judged, case_verdict, judge
 from pamrs.diagnosis.noise import Excess
-from pamrs.diagnosis.prepare import Block, available_blocks
+from pamrs.diagnosis.prepare import Block
 from pamrs.effects import Hypothesis, Term
 from pamrs.findings import Unexplained, WrongParameter
 from pamrs.report.text import kept_sentence, sentence_of
+from tests.diagnosis.asked import SETTINGS, blocks_of
+from tests.diagnosis.likelihoods import made_up
+from tests.diagnosis.noisy import SHOULDER
 from tests.diagnosis.terms import by_text, of_texts, terms
 
-SETTINGS = DiagnosisSettings()
-
 RIG = pamrs.rigs.shoulder()
-CHANNELS = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
-BLOCKS = {b.name: b for b in available_blocks(RIG, CHANNELS)}
+BLOCKS = blocks_of(RIG, ("valve_command", *SHOULDER))
 HEALTHY = ("none", "parameters", "unlisted")
 
 
 def candidate(key: str, moved: dict[str, float] | None = None) -> Candidate:
     """A hypothesis by its key, without a fit behind it."""
-    own = Hypothesis.parse(key).terms
-    effects = tuple(term for term in own if term.is_effect)
-    wrong = tuple(term.id for term in own if term.is_value)
-    none = Fit(effects, RIG, {}, {}, None, 0.0, {}, moved or {})  # type: ignore[arg-type]
-    return Candidate(effects, none, {}, {}, 0.0, wrong=wrong)
+    return made_up(RIG, key, {}, moved=moved or {})
 
 
 def group(
@@ -54,16 +43,9 @@ def group(
     keys = [key for key in probabilities if key not in ("", "unlisted")]
     size = Excess(4.0 if shifted else 1.0, 1.0, 0.0, 1.0, 1.0, 1.1)
     mismatch = None if set(probabilities) == {""} else block
-    return BlockGroup(
-        [block],
-        {name: size},
-        {name: size},
-        [candidate("", moved), *(candidate(k) for k in keys)],
-        of_texts(probabilities),
-        mismatch,
-        {},
-        [],
-    )
+    found = [candidate("", moved), *map(candidate, keys)]
+    kept, chances = {name: size}, of_texts(probabilities)
+    return BlockGroup([block], kept, kept, found, chances, mismatch, {}, [])
 
 
 def case_probabilities(judged: list[Judged]) -> dict[str, float]:
@@ -87,17 +69,14 @@ def said(*groups: BlockGroup) -> tuple[list[Judged], str]:
 
 
 def test_one_block_without_a_name_takes_nothing_from_a_name_in_another() -> None:
-    alone = judge([group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02})], SETTINGS)
-    judged, verdict = said(
-        group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02}),
-        group("arm", {"muscle_creep": 0.01, "unlisted": 0.99}),
-    )
+    gas, arm = {"valve_dead_zone": 0.98, "unlisted": 0.02}, {"muscle_creep": 0.01, "unlisted": 0.99}
+    judged, verdict = said(group("chamber", gas), group("arm", arm))
     assert verdict == "effects"
     assert [j.verdict for j in judged] == ["effects", "unlisted"]
     assert judged[0].named == terms("valve_dead_zone")
-    assert judged[0].probability(Term("valve_dead_zone")) == pytest.approx(
-        alone[0].probability(Term("valve_dead_zone"))
-    )
+    (alone,) = judge([group("chamber", gas)], SETTINGS)
+    name = Term("valve_dead_zone")
+    assert judged[0].probability(name) == pytest.approx(alone.probability(name))
     found = case_probabilities(judged)
     assert max(found, key=lambda key: found[key]) == "valve_dead_zone"
     assert found["unlisted"] < 0.03
@@ -116,11 +95,9 @@ def test_an_effect_of_two_groups_is_judged_once() -> None:
 def with_encoder(found: BlockGroup, size: float) -> BlockGroup:
     """The group with a value of the encoder's error in its hypothesis."""
     fit = found.candidates[0].fit
-    values = {"encoder_error.sine": size}
+    known = {"values": {"encoder_error.sine": size}, "std": {"encoder_error.sine": 0.01}}
     own = [
-        replace(
-            c, fit=replace(fit, effects=c.effects, values=values, std=dict.fromkeys(values, 0.01))
-        )
+        replace(c, fit=replace(fit, effects=c.effects, **known))
         if c.terms == terms("encoder_error")
         else c
         for c in found.candidates
@@ -149,16 +126,12 @@ def test_what_two_groups_have_is_paid_for_once() -> None:
 
 def test_open_sets_stand_beside_what_is_settled() -> None:
     gas = {"leak_muscle": 0.6, "chamber.dead_volume": 0.4}
-    judged, verdict = said(
-        group("chamber", gas), group("arm", {"muscle_creep": 0.98, "unlisted": 0.02})
-    )
-    assert verdict == "effects"
-    assert case_ambiguity(judged) == [
-        ["leak_muscle", "muscle_creep"],
-        ["chamber.dead_volume", "muscle_creep"],
-    ]
-    judged, _ = said(group("chamber", gas), group("arm", {"unlisted": 0.98, "muscle_creep": 0.02}))
-    assert case_ambiguity(judged) == [["leak_muscle"], ["chamber.dead_volume"]]
+    open_sets = [["leak_muscle"], ["chamber.dead_volume"]]
+    for creep, settled in ((0.98, ["muscle_creep"]), (0.02, [])):
+        arm = {"muscle_creep": creep, "unlisted": 1.0 - creep}
+        judged, verdict = said(group("chamber", gas), group("arm", arm))
+        assert verdict == "effects"
+        assert case_ambiguity(judged) == [[*names, *settled] for names in open_sets]
 
 
 def test_a_wrong_parameter_is_the_verdict_parameters() -> None:
@@ -169,58 +142,41 @@ def test_a_wrong_parameter_is_the_verdict_parameters() -> None:
     assert judged[0].wrong == ("chamber.dead_volume",)
     assert case_probabilities(judged)["chamber.dead_volume"] > 0.9
     # and stays it where another block keeps something without a name; an effect comes first
-    assert (
-        said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"unlisted": 1.0}))[1]
-        == "parameters"
-    )
-    assert (
-        said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"muscle_creep": 1.0}))[1]
-        == "effects"
-    )
+    wrong = group("chamber", {"chamber.dead_volume": 1.0})
+    assert said(wrong, group("arm", {"unlisted": 1.0}))[1] == "parameters"
+    assert said(wrong, group("arm", {"muscle_creep": 1.0}))[1] == "effects"
 
 
 def test_a_name_that_is_more_probable_than_not_is_given() -> None:
-    (one,) = judge(
-        [group("arm", {"muscle_creep": 0.35, "muscle_creep+payload_swing": 0.25, "unlisted": 0.4})],
-        SETTINGS,
-    )
+    def of(chances: dict[str, float]) -> Judged:
+        (judged,) = judge([group("arm", chances)], SETTINGS)
+        return judged
+
+    one = of({"muscle_creep": 0.35, "muscle_creep+payload_swing": 0.25, "unlisted": 0.4})
     assert (one.verdict, one.named) == ("effects", terms("muscle_creep"))
-    assert left_open(one.ambiguity) == [
-        ["unlisted"],
-        ["muscle_creep"],
-        ["muscle_creep", "payload_swing"],
-    ]
-    (two,) = judge(
-        [group("arm", {"muscle_creep": 0.45, "muscle_hysteresis": 0.4, "unlisted": 0.15})], SETTINGS
-    )
+    both = ["muscle_creep", "payload_swing"]
+    assert left_open(one.ambiguity) == [["unlisted"], ["muscle_creep"], both]
+    two = of({"muscle_creep": 0.45, "muscle_hysteresis": 0.4, "unlisted": 0.15})
     assert (two.verdict, two.named) == ("effects", terms("muscle_creep"))
-    (none,) = judge(
-        [group("arm", {"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})], SETTINGS
-    )
+    none = of({"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})
     assert none.verdict == "unlisted"
 
 
 def test_healthy_groups() -> None:
-    assert said(group("chamber", {"": 1.0}), group("arm", {"": 1.0}))[1] == "none"
-    assert (
-        said(group("chamber", {"": 1.0}, shifted=True), group("arm", {"": 1.0}))[1] == "parameters"
-    )
-    judged, verdict = said(
-        group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}), group("arm", {"": 1.0})
-    )
-    assert verdict == "parameters"
+    gas, arm = (group(name, {"": 1.0}) for name in ("chamber", "arm"))
+    assert said(gas, arm)[1] == "none"
+    assert said(group("chamber", {"": 1.0}, shifted=True), arm)[1] == "parameters"
     # a parameter at its wall, and nobody knows why
-    assert left_open(judged[0].ambiguity) == [["parameters"], ["unlisted"]]
-    judged, _ = said(
-        group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}),
-        group("arm", {"": 1.0}, moved={"arm.payload": 3.0}),
-    )
-    assert case_ambiguity(judged) == [["parameters"], ["unlisted"]]
+    at_wall = [["parameters"], ["unlisted"]]
+    gas = group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0})
+    judged, verdict = said(gas, arm)
+    assert verdict == "parameters"
+    assert left_open(judged[0].ambiguity) == at_wall
+    judged, _ = said(gas, group("arm", {"": 1.0}, moved={"arm.payload": 3.0}))
+    assert case_ambiguity(judged) == at_wall
     # what is open in a block keeps that it may have no name
-    judged, _ = said(
-        group("chamber", {"valve_dead_zone": 1.0}),
-        group("arm", {"muscle_creep": 0.5, "unlisted": 0.5}),
-    )
+    arm = group("arm", {"muscle_creep": 0.5, "unlisted": 0.5})
+    judged, _ = said(group("chamber", {"valve_dead_zone": 1.0}), arm)
     assert sorted(case_ambiguity(judged)) == [
         ["muscle_creep", "valve_dead_zone"],
         ["valve_dead_zone", "unlisted"],
@@ -248,12 +204,9 @@ def test_probabilities_add_to_one_and_verdicts_follow_them(
     for j in judged:
         assert sum(j.probabilities.values()) == pytest.approx(1.0)
         assert bool(j.named or j.wrong) == (j.verdict in ("effects", "parameters"))
-        best = max(j.probabilities.values())
-        assert (
-            j.ambiguity == []
-            if best >= 0.9
-            else all(j.probabilities[h] >= 0.05 for h in j.ambiguity)
-        )
+        settled = max(j.probabilities.values()) >= 0.9
+        assert not (settled and j.ambiguity)
+        assert all(j.probabilities[h] >= 0.05 for h in j.ambiguity)
     sets = case_ambiguity(judged)
     assert len({tuple(s) for s in sets}) == len(sets)
     assert not sets or any(j.ambiguity for j in judged)
@@ -267,19 +220,8 @@ def test_probabilities_add_to_one_and_verdicts_follow_them(
 
 
 def test_sentences_have_units_of_the_field() -> None:
-    wrong = WrongParameter(
-        "chamber.dead_volume",
-        "chamber",
-        1.5e-4,
-        2.25e-5,
-        3.6e-4,
-        5e-6,
-        [3.5e-4, 3.7e-4],
-        "m3",
-        9.3,
-        0.98,
-        {},
-    )
+    sizes = (1.5e-4, 2.25e-5, 3.6e-4, 5e-6, [3.5e-4, 3.7e-4], "m3", 9.3, 0.98, {})
+    wrong = WrongParameter("chamber.dead_volume", "chamber", *sizes)
     assert sentence_of(wrong) == "chamber dead volume is 360.0 +- 5.0 cm3, not 150 +- 22"
     kept = Unexplained("arm", "joint_angle", "rad", 15.2, 0.007, "unlisted")
     assert kept_sentence(kept) == (
@@ -289,9 +231,8 @@ def test_sentences_have_units_of_the_field() -> None:
 
 
 def test_a_wrong_value_is_named_beside_an_effect() -> None:
-    judged, verdict = said(
-        group("chamber", {"clock_skew+valve.discharge_area_max": 0.9, "unlisted": 0.1})
-    )
+    both = {"clock_skew+valve.discharge_area_max": 0.9, "unlisted": 0.1}
+    judged, verdict = said(group("chamber", both))
     assert verdict == "effects"
     assert judged[0].named == terms("clock_skew")
     assert judged[0].wrong == ("valve.discharge_area_max",)

@@ -6,12 +6,12 @@ import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, possible_gain, weigh
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.evidence._verdicts import _capped
@@ -24,10 +24,10 @@ from pamrs.diagnosis.search import _hypotheses
 from pamrs.effects import EFFECTS, NONE, UNLISTED, Hypothesis, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
-from tests.diagnosis.likelihoods import TIMES, leaving, rows_of
+from tests.diagnosis.asked import SETTINGS
+from tests.diagnosis.likelihoods import TIMES, made_up, rows_of
 from tests.diagnosis.terms import by_text, terms
 
-SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
 BLOCKS = available_blocks(RIG, ("valve_command", *again.NOISE))
 ARM = [b for b in BLOCKS if b.name == "arm"]
@@ -52,13 +52,10 @@ def hypothesis(
     values = {name: value for name, (value, _) in known.items()}
     std = {name: spread for name, (_, spread) in known.items()}
     spreads = np.array(list(std.values()))
-    covariance = np.outer(spreads, spreads) * (
-        correlation + (1.0 - correlation) * np.eye(len(spreads))
-    )
-    scales = dict.fromkeys(values, 1.0)
-    fit = Fit(terms(*effects), RIG, values, std, covariance, 0.0, {}, scales=scales, events=events)
+    alike = correlation + (1.0 - correlation) * np.eye(len(spreads))
+    fitted = {"std": std, "covariance": np.outer(spreads, spreads) * alike, "events": events}
     kept = {"arm": Excess(1.0 + left * (BEFORE - 1.0), 0.0, 0.5, 1.0, 1.0, 1.2, 0.05)}
-    return Candidate(terms(*effects), fit, kept, kept, 0.0, likelihood=leaving(kept))
+    return made_up(RIG, "+".join(effects), kept, values, **fitted)
 
 
 def weighed(*found: Candidate) -> dict[str, float]:
@@ -104,18 +101,8 @@ def test_a_value_far_from_its_prior_is_rare_and_not_ruled_out() -> None:
 def test_how_far_a_value_is(name: str, value: float, distance: float | None) -> None:
     nominal, tolerance = 1.0, 0.1
     moved = (value - nominal) / tolerance
-    fit = Fit(
-        (),
-        RIG,
-        {name: value},
-        {},
-        np.zeros((1, 1)),
-        0.0,
-        {},
-        {name: moved},
-        scales={name: tolerance},
-    )
-    found = replace(hypothesis({}, 0.0), fit=fit, wrong=(name,))
+    known = {"moved": {name: moved}, "scales": {name: tolerance}}
+    found = made_up(RIG, name, {}, {name: value}, **known)
     expected = abs(moved) if distance is None else max(distance, abs(moved))
     assert found.outside(1.0) == pytest.approx(math.log(expected))
 
@@ -268,7 +255,7 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
 
     trial = SimpleNamespace(
         settings=SETTINGS,
-        fit_shortly=shortly,
+        fit_within_reach=lambda each, fit, **_: [shortly(starts, fit) for starts in each],
         start_of=lambda fit, effect: Start(effect, {}, {}, (), False),
     )
     search = SimpleNamespace(
@@ -283,9 +270,33 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
     }
     found, _, _ = _hypotheses._shortlist(search, [[term] for term in ranked], ranked)
     assert [term.id for term in found] == ["muscle_rate_damping"]
-    assert sorted(asked) == sorted(
-        [(effect, 1.0) for effect in keys] + [("muscle_rate_damping", 2.0)]
-    )
+    every = [*((effect, 1.0) for effect in keys), ("muscle_rate_damping", 2.0)]
+    assert sorted(asked) == sorted(every)
+
+
+def test_what_is_far_behind_after_one_step_is_not_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within ten times the least, or the best of one of the two best effects, is."""
+    costs = {
+        "muscle_creep": (1.0, 9.0, 11.0),
+        "payload_swing": (50.0, 60.0),
+        "heat_transfer": (70.0,),
+    }
+    each = [
+        [Start(Term(effect), {"cost": cost}, {}, (), False)]
+        for effect, own in costs.items()
+        for cost in own
+    ]
+
+    def shortly(_: Attempts, starts: list[Start], *rest: Any) -> SimpleNamespace:
+        return SimpleNamespace(cost=starts[0].free["cost"], start=starts[0])
+
+    monkeypatch.setattr(Attempts, "_fit_shortly", shortly)
+    monkeypatch.setattr(Attempts, "start_of", lambda _, first, effect: first.start)
+    monkeypatch.setattr(Attempts, "_judged", lambda _, starts, found, wrong: found.cost)
+    tried = Attempts.fit_within_reach(Attempts(*6 * [None]), each, None, most=2)
+    assert tried == [1.0, 9.0, None, 50.0, None, None]
+    tried = Attempts.fit_within_reach(Attempts(*6 * [None]), each, None, most=2, least=0.5)
+    assert tried == [1.0, None, None, 50.0, None, None]
 
 
 @pytest.mark.parametrize(

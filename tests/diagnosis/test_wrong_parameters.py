@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -12,58 +14,45 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts, Candidate
 from pamrs.diagnosis.fit import Problem, fit
-from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
 from pamrs.diagnosis.search import suspects_at_wall
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, _needless
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.asked import ROLES, SETTINGS, diagnosed, problem_of
+from tests.diagnosis.noisy import SHOULDER, driven
 
-SETTINGS = DiagnosisSettings()
-
-NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
-NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
+RIG = pamrs.rigs.shoulder()
 
 
 def recorded(
-    rig: pamrs.Rig, name: str, role: str, *, seed: int, force: float = 0.0, seconds: float = 8.0
+    rig: pamrs.Rig, role: str, seed: int, *, force: float = 0.0, seconds: float = 8.0
 ) -> Recording:
     """Some seconds of a shoulder at 200 Hz; with an angle that lies by a wave of so many rad,
     which no effect makes.
     """
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, seconds, 0.005)
-    command = (
-        5.0 + 0.5 * np.sin(2 * np.pi * 0.2 * time + seed) + 0.25 * np.sin(2 * np.pi * 0.7 * time)
-    )
-    run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
-    values = {"valve_command": command, **{n: run[n] for n in NAMES[1:]}}
-    values["joint_angle"] = values["joint_angle"] + force * np.sin(
-        24.0 * values["joint_angle"] + 0.3
-    )
-    channels = {
-        n: v + NOISE.get(n, 0.0) * rng.standard_normal(time.size) for n, v in values.items()
-    }
-    mask = {n: np.ones(time.size, dtype=bool) for n in channels}
-    return Recording(name, role, time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
+    turn = 2 * np.pi * np.arange(0.0, seconds, 0.005)
+    command = {"valve_command": 5.0 + 0.5 * np.sin(0.2 * turn + seed) + 0.25 * np.sin(0.7 * turn)}
+    one = driven(rig, f"r{seed}", role, 0.005, command, SHOULDER, [seed])
+    angle = one.channels["joint_angle"]
+    lies = {"joint_angle": angle + force * np.sin(24.0 * angle + 0.3)}
+    return replace(one, channels=one.channels | lies)
 
 
-def case(true: pamrs.Rig, nominal: pamrs.Rig, **options: float) -> pamrs.Case:
-    roles = enumerate(("fit", "fit", "held_out"))
-    found = [recorded(true, f"r{k}", role, seed=k, **options) for k, role in roles]
-    return pamrs.Case("case", nominal, found, Path())
+def found_in(true: pamrs.Rig, **options: float) -> pamrs.Diagnosis:
+    """What the nominal shoulder lacks of recordings of another."""
+    return diagnosed(RIG, partial(recorded, true, **options))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "factor"), [("chamber.dead_volume", 2.4), ("arm.payload", 0.75)])
 def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor: float) -> None:
-    rig = pamrs.rigs.shoulder()
-    true = rig.parameter(name).value * factor
-    found = pamrs.diagnose(case(rig.with_parameters({name: true}), rig), consider=[name])
+    true = RIG.parameter(name).value * factor
+    records = [recorded(RIG.with_parameters({name: true}), role, k) for k, role in enumerate(ROLES)]
+    found = pamrs.diagnose(pamrs.Case("case", RIG, records, Path()), consider=[name])
     assert found.verdict == "parameters"
     (asked,) = found.considered
     # what a model is usually off by covers the rest: no block has a mismatch to be left
@@ -73,7 +62,7 @@ def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor
     )
     (wrong,) = found.wrong_parameters
     assert wrong["name"] == name
-    assert wrong["nominal"] == rig.parameter(name).value
+    assert wrong["nominal"] == RIG.parameter(name).value
     assert wrong["interval"][0] < true < wrong["interval"][1]
     # the model holds the value, and predicts held-out recordings with it
     assert found.rig.parameter(name).value == pytest.approx(true, rel=0.05)
@@ -89,30 +78,23 @@ def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor
 
 
 def test_a_value_inside_its_tolerance_is_not_called_wrong() -> None:
-    rig = pamrs.rigs.shoulder()
-    true = rig.with_parameters({"chamber.dead_volume": 1.5e-4 + 2.0 * 2.25e-5})
-    found = pamrs.diagnose(case(true, rig))
+    found = found_in(RIG.with_parameters({"chamber.dead_volume": 1.5e-4 + 2.0 * 2.25e-5}))
     assert found.verdict == "parameters"
     assert found.wrong_parameters == []
 
 
 @pytest.mark.slow
 def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
-    rig = pamrs.rigs.shoulder()
-    true = rig.with_effect("valve_dead_zone", {"half_width": 0.05})
+    true = RIG.with_effect("valve_dead_zone", {"half_width": 0.05})
     # five times what an encoder is usually off by
-    found = pamrs.diagnose(case(true, rig, force=2e-2, seconds=12.0))
+    found = found_in(true, force=2e-2, seconds=12.0)
     assert found.verdict == "effects"
     assert [e["id"] for e in found.effects] == ["valve_dead_zone"]
     assert found.effects[0]["probability"] > 0.8
     assert found.where["block"] == "chamber"
     gas, arm = found.blocks
-    assert (gas["blocks"], gas["verdict"], gas["effects"]) == (
-        ["supply", "chamber"],
-        "effects",
-        ["valve_dead_zone"],
-    )
-    assert (arm["blocks"], arm["verdict"], arm["effects"]) == (["arm"], "unlisted", [])
+    assert (gas.blocks, gas.verdict) == (["supply", "chamber"], "effects")
+    assert (arm.blocks, arm.verdict, arm.effects) == (["arm"], "unlisted", [])
     chamber = next(m for m in gas["mismatch"] if m["block"] == "chamber")
     assert chamber["held_out"]["refit"]["noises"] > 3.0 * chamber["held_out"]["after"]["noises"]
     kept = found.unexplained[0]
@@ -123,27 +105,16 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
 
 
 def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
-    rig = pamrs.rigs.shoulder()
-    true = rig.with_parameters({"arm.payload": 0.7 * 9.07})
-    prepared = [prepare(recorded(true, "r", "fit", seed=1, seconds=12.0), rig, SETTINGS)]
-    (arm,) = (b for b in available_blocks(rig, NAMES) if b.name == "arm")
-    problem = Problem([arm], prepared, core_rig(rig), SETTINGS)
-    baseline = fit(problem, rig, (), {}, {"arm": 1.0}, evaluations=20)
-    found = suspects_at_wall(baseline, [arm])
+    true = RIG.with_parameters({"arm.payload": 0.7 * 9.07})
+    problem = problem_of(RIG, [recorded(true, "fit", 1, seconds=12.0)], "arm")
+    white = {"arm": 1.0}
+    baseline = fit(problem, RIG, (), {}, white, evaluations=20)
+    found = suspects_at_wall(baseline, problem.blocks)
     assert ("arm.payload",) in found
     assert ("arm.payload", "arm.first_moment") in found
     assert all(abs(baseline.moved[name]) <= 3.0 + 1e-9 for name in baseline.moved)
-    loose = fit(
-        problem,
-        rig,
-        (),
-        {},
-        {"arm": 1.0},
-        freed=["arm.payload"],
-        warm=baseline,
-        evaluations=30,
-        share=1e-5,
-    )
+    more = {"freed": ["arm.payload"], "warm": baseline, "evaluations": 30, "share": 1e-5}
+    loose = fit(problem, RIG, (), {}, white, **more)
     assert loose.freed == ("arm.payload",)
     assert loose.moved["arm.payload"] < -10.0
     assert loose.values["arm.payload"] == pytest.approx(0.7 * 9.07, rel=0.03)
@@ -154,30 +125,15 @@ def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
 @pytest.mark.slow
 def test_a_dead_time_of_the_command_leads_a_late_clock() -> None:
     """A clock without a drift would leave the same recordings, and is rarer."""
-    rig = pamrs.rigs.shoulder()
 
-    def late(name: str, role: str, seed: int) -> Recording:
-        rng = np.random.default_rng(seed)
-        time = np.arange(0.0, 12.0, 0.005)
-        command = (
-            5.0
-            + 0.5 * np.sin(2 * np.pi * 0.2 * time + seed)
-            + 0.4 * np.sign(np.sin(2 * np.pi * 0.35 * time + 2 * seed))
-        )
-        run = pamrs.simulate(
-            rig, valve_command=np.concatenate([np.full(5, 5.0), command[:-5]]), sample_time=0.005
-        )
-        channels = {
-            "valve_command": command,
-            **{n: run[n] + NOISE[n] * rng.standard_normal(time.size) for n in NAMES[1:]},
-        }
-        mask = {n: np.ones(time.size, dtype=bool) for n in channels}
-        return Recording(name, role, time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
+    def late(role: str, seed: int) -> Recording:
+        turn = 2 * np.pi * np.arange(0.0, 12.0, 0.005)
+        wave = 0.5 * np.sin(0.2 * turn + seed) + 0.4 * np.sign(np.sin(0.35 * turn + 2 * seed))
+        acts = {"valve_command": 5.0 + np.concatenate([np.zeros(5), wave[:-5]])}
+        one = driven(RIG, f"r{seed}", role, 0.005, acts, SHOULDER, [seed])
+        return replace(one, channels=one.channels | {"valve_command": 5.0 + wave})
 
-    roles = ("fit", "fit", "held_out")
-    found = pamrs.diagnose(
-        pamrs.Case("late", rig, [late(f"r{k}", role, k) for k, role in enumerate(roles)], Path())
-    )
+    found = diagnosed(RIG, late)
     assert found.verdict == "effects"
     assert found.probabilities["input_path_lag"] > found.probabilities["clock_skew"] > 0.0
     told = {e["id"]: (e["form"], e["parameters"]) for e in found.effects}
@@ -188,8 +144,7 @@ def test_a_dead_time_of_the_command_leads_a_late_clock() -> None:
 
 @pytest.mark.slow
 def test_a_zero_that_two_groups_share_is_named_once() -> None:
-    rig = pamrs.rigs.shoulder()
-    found = pamrs.diagnose(case(rig.with_parameters({"sensors.pressure_zero": 4500.0}), rig))
+    found = found_in(RIG.with_parameters({"sensors.pressure_zero": 4500.0}))
     assert found.verdict == "parameters"
     (wrong,) = found.wrong_parameters
     assert wrong["name"] == "sensors.pressure_zero"
@@ -216,12 +171,8 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
     asked: list[tuple[str, ...]] = []
 
     class Trial:
-        settings = SETTINGS
-        inner, nominal, white = (
-            Problem([], [], core_rig(pamrs.rigs.shoulder()), SETTINGS),
-            pamrs.rigs.shoulder(),
-            {},
-        )
+        settings, nominal, white = SETTINGS, RIG, {}
+        inner = Problem([], [], core_rig(RIG), SETTINGS)
 
         def fit_freed(self, names: tuple[str, ...], baseline: object, share: object) -> None:
             asked.append(names)

@@ -1,7 +1,7 @@
 """Every chapter at once: what is kept and when, how it goes on, and the page of all statements."""
 
-import csv
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +13,9 @@ from reproduction import CHAPTERS, store
 from reproduction.__main__ import main
 from reproduction.page import Picture, Section, page
 from reproduction.summary import counts, summary
+from tests.reproduction.pages import DOCS, facts, page_of
 from tests.tables import rows_of
 
-DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 ROWS = (
     judge("one", "a | b", "6.2", 1.0, 1.01, "bar", tolerance=0.1),
     judge("one", "c", "6.3", 1.0, 2.0, tolerance=0.1, reason="because | of it"),
@@ -189,11 +189,9 @@ def test_summary_in_the_documentation_counts_the_tables_beside_it():
     assert "Made by `make reproduce`" in text
     total = [0] * (len(KINDS) + 1)
     for chapter in CHAPTERS.values():
-        with (DOCS / chapter / "facts.csv").open(encoding="utf-8", newline="") as stream:
-            rows = list(csv.DictReader(stream))
-        counted = [row for row in rows if not row["apart"]]
+        counted = [row for row in facts(chapter) if not row["apart"]]
         found = [sum(row["kind"] == kind for row in counted) for kind in KINDS]
-        found.append(len(rows) - len(counted))
+        found.append(len(facts(chapter)) - len(counted))
         assert f"({chapter}.md) | {' | '.join(map(str, found))} |" in text
         total = [a + b for a, b in zip(total, found, strict=True)]
     assert f"| **all** | {' | '.join(map(str, total))} |" in text
@@ -202,15 +200,23 @@ def test_summary_in_the_documentation_counts_the_tables_beside_it():
 
 @pytest.mark.parametrize("chapter", CHAPTERS.values())
 def test_what_is_only_above_another_never_agrees_on_its_own(chapter):
-    with (DOCS / chapter / "facts.csv").open(encoding="utf-8", newline="") as stream:
-        rows = [row for row in csv.DictReader(stream) if not row["apart"]]
     compared = [
         row
-        for row in rows
-        if row["relation"] != "equals"
+        for row in facts(chapter)
+        if not row["apart"]
+        and row["relation"] != "equals"
         and (row["published"] == "0" or (row["published"] == "1" and not row["unit"]))
     ]
     assert [row["fact"] for row in compared if row["kind"] == KINDS[0]] == []
+
+
+@pytest.mark.parametrize("chapter", CHAPTERS.values())
+def test_page_in_the_documentation_says_its_command_and_has_its_pictures(chapter):
+    text = page_of(chapter)
+    assert "`make reproduce`" in text.splitlines()[2]
+    links = re.findall(r"\]\(([^)]+\.png)\)", text)
+    assert len(links) >= 8
+    assert all((DOCS / link).is_file() for link in links)
 
 
 # -------------------------------------------------------------------------- the command

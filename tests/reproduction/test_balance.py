@@ -24,12 +24,11 @@ def test_balance_is_that_of_another_audit(two):
 
 
 def test_balance_does_not_hang_on_its_points(two):
-    fine = cycles(lifting_plant(27.0, 2), math.radians(50.0), points=800)
+    own = lifting_plant(27.0, 2), math.radians(50.0)
+    fine = cycles(*own, points=800)
     assert 100.0 * fine.efficiency == pytest.approx(two[-1], rel=1e-3)
     # each cycle after the first takes the same
-    once, twice, thrice = (
-        cycles(lifting_plant(27.0, 2), math.radians(50.0), n, points=200).energy for n in (1, 2, 3)
-    )
+    once, twice, thrice = (cycles(*own, n, points=200).energy for n in (1, 2, 3))
     assert twice - once == pytest.approx(thrice - twice, rel=1e-9)
 
 
@@ -40,13 +39,6 @@ def test_loop_comes_to_the_balance(two):
 
 def test_number_of_muscles_hardly_matters_where_air_is_counted_in_gauge_pressures():
     for payload in (0.0, 27.0):
-        found = [
-            cycles(
-                lifting_plant(payload, n, model="gaylord", ambient=1e3),
-                math.radians(90.0),
-                2,
-                points=100,
-            ).efficiency
-            for n in (2, 4, 6)
-        ]
+        plants = (lifting_plant(payload, n, model="gaylord", ambient=1e3) for n in (2, 4, 6))
+        found = [cycles(own, math.radians(90.0), 2, points=100).efficiency for own in plants]
         assert max(found) / min(found) < 1.05

@@ -19,9 +19,9 @@ from reproduction import CHAPTERS, chapter3, chapter5, elbow
 from reproduction.page import Picture, Section, page
 from reproduction.statement_tables import markdown, to_csv
 from reproduction.statements import symbols
+from tests.reproduction.pages import by_fact, facts, page_of
 from tests.tables import rows_of
 
-DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 AXIAL, OFFSET, TENDON = 1.56 * 0.0254, 0.42 * 0.0254, 3.04 * 0.0254
 #: Statements of the chapter's experiments with which ours do not agree; one that changes sides must
 #: be noticed.
@@ -37,10 +37,6 @@ DIFFER = {
     "least over largest torque from 0 to 78 deg of rotation, 150 psi",
     "largest over resting diameter of the chapter's muscles, the larger",
 }
-
-
-def read_csv(path):
-    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"))))
 
 
 @pytest.fixture(scope="module")
@@ -67,18 +63,16 @@ def test_verdict(published, ours, options, verdict):
 def test_a_fact_needs_a_source_and_a_criterion():
     with pytest.raises(ParameterError, match="where is empty: the fact 'fact'"):
         judge("group", "fact", " ", 1.0, 1.0)
-    with pytest.raises(
-        ParameterError, match="relation = 'near' is not allowed: one of 'equals', 'above', 'below'"
-    ):
+    words = "relation = 'near' is not allowed: one of 'equals', 'above', 'below'"
+    with pytest.raises(ParameterError, match=words):
         judge("group", "fact", "3.2", 1.0, 1.0, relation="near")
     with pytest.raises(ParameterError, match="basis = 'luck' is not allowed"):
         judge("group", "fact", "3.2", 1.0, 1.0, basis="luck")
     for tolerance in (-1.0, math.nan):
         with pytest.raises(ParameterError, match=f"tolerance = {tolerance}"):
             judge("group", "fact", "3.2", 1.0, 1.0, tolerance=tolerance)
-    assert (
-        judge("group", "fact", "3.2", 10.0, 9.0, "in", tolerance=0.5).criterion == "within 0.5 in"
-    )
+    near = judge("group", "fact", "3.2", 10.0, 9.0, "in", tolerance=0.5)
+    assert near.criterion == "within 0.5 in"
     assert judge("group", "fact", "3.2", 10.0, 9.0, relation="below").criterion == "below"
 
 
@@ -88,10 +82,9 @@ def test_text_markdown_and_csv_have_every_fact():
         judge("second", "c", "3.4", 1.0, 2.0, relation="above", basis="construction"),
         judge("second", "d", "3.5", 0.5, math.nan, "in", cannot_tell="no section"),
     ]
-    text, page_text = (
-        table(made, headings={"first": "The first"}),
-        markdown(made, headings={"first": "The first"}, below={"second": "end"}),
-    )
+    headings, below = {"first": "The first"}, {"second": "end"}
+    text = table(made, headings=headings)
+    page_text = markdown(made, headings=headings, below=below)
     for row in made:
         assert row.fact in text
         assert row.where in text
@@ -107,11 +100,8 @@ def test_text_markdown_and_csv_have_every_fact():
     parsed = list(csv.DictReader(io.StringIO(to_csv(made))))
     assert [row["fact"] for row in parsed] == ["a | b", "c", "d"]
     assert parsed[0]["relative"] == "-0.1"
-    assert (parsed[1]["basis"], parsed[2]["ours"], parsed[2]["verdict"]) == (
-        "construction",
-        "",
-        "cannot tell",
-    )
+    assert parsed[1]["basis"] == "construction"
+    assert (parsed[2]["ours"], parsed[2]["verdict"]) == ("", "cannot tell")
     assert [row["kind"] for row in parsed] == ["differs", "agrees by construction", "cannot tell"]
     assert verdicts(made) == (
         "0 agree on their own, 1 by construction, 0 in sign only, 1 differ, 1 cannot tell"
@@ -129,15 +119,8 @@ def test_text_markdown_and_csv_have_every_fact():
 def test_page_shows_command_numbers_and_pictures_from_where_it_stands():
     row = judge("group", "fact", "3.2", 1.0, 1.0)
     pictures = [Picture("one", "group", "What it shows", b"")]
-    section = Section(
-        "Title",
-        [row],
-        {},
-        ["In short."],
-        [("a.b", "1 m", "the reason")],
-        pictures,
-        [("nu", "error squared", "rad2 s")],
-    )
+    chosen, used = [("a.b", "1 m", "the reason")], [("nu", "error squared", "rad2 s")]
+    section = Section("Title", [row], {}, ["In short."], chosen, pictures, used)
     text = page([section], "make x", "pictures/here")
     assert text.splitlines()[2].startswith("Made by `make x`")
     assert "![What it shows](pictures/here/one.png)" in text
@@ -149,27 +132,14 @@ def test_page_shows_command_numbers_and_pictures_from_where_it_stands():
 
 @pytest.mark.parametrize("name", CHAPTERS)
 def test_page_in_the_documentation_explains_the_symbols_that_it_uses(name):
-    text = (DOCS / f"{name.replace('ch', 'chapter')}.md").read_text(encoding="utf-8")
+    text = page_of(name.replace("ch", "chapter"))
     table = [f"| {' | '.join(row)} |" for row in symbols(name)]
-    assert (
-        "\n".join(
-            [
-                "### Symbols and abbreviations",
-                "",
-                "| symbol | meaning | unit |",
-                "|---|---|---|",
-                *table,
-                "",
-                "### ",
-            ]
-        )
-        in text
-    )
+    head = ["### Symbols and abbreviations", "", "| symbol | meaning | unit |", "|---|---|---|"]
+    assert "\n".join([*head, *table, "", "### "]) in text
     rest = text.replace("\n".join(table), "")
     for symbol in (word.strip() for row in symbols(name) for word in row[0].split(",")):
-        assert re.search(
-            rf"\b{re.escape(symbol.removeprefix('effects such as ').strip('`'))}\b", rest
-        ), symbol
+        plain = symbol.removeprefix("effects such as ").strip("`")
+        assert re.search(rf"\b{re.escape(plain)}\b", rest), symbol
     assert [line for line in page([], "x").splitlines()[4:] if line not in text] == []
 
 
@@ -197,19 +167,20 @@ def geometry(rotation):
 def test_torque_laws_are_the_printed_equations_and_power():
     rotation = np.radians(np.linspace(0.0, 110.0, 56))
     contraction, printed, conserving = geometry(rotation)
-    force = 6.0 * rigs.named("elbow").muscle.force(
-        150.0 * elbow.PSI, contraction / (7.785 * 0.0254)
-    )
+
+    def pull(travel):
+        share = travel / (7.785 * 0.0254)
+        return 6.0 * rigs.named("elbow").muscle.force(150.0 * elbow.PSI, share)
+
+    force = pull(contraction)
     # the file has the rest angle to 1e-5 deg
-    np.testing.assert_allclose(
-        elbow.elbow_torque(rotation, law="printed"), force * printed, rtol=1e-5
-    )
-    np.testing.assert_allclose(elbow.elbow_torque(rotation), force * conserving, rtol=1e-5)
+    for law, lever in (("printed", printed), ("conserving", conserving)):
+        torque = elbow.elbow_torque(rotation, law=law)
+        np.testing.assert_allclose(torque, force * lever, rtol=1e-5)
     fine = np.linspace(0.1, 1.8, 20001)
     travel = geometry(fine)[0]
     work = np.trapezoid(elbow.elbow_torque(fine), fine)
-    pull = 6.0 * rigs.named("elbow").muscle.force(150.0 * elbow.PSI, travel / (7.785 * 0.0254))
-    assert work == pytest.approx(np.trapezoid(pull, travel), rel=1e-7)
+    assert work == pytest.approx(np.trapezoid(pull(travel), travel), rel=1e-7)
 
 
 def test_another_braid_angle_is_that_of_every_experiment_inside_it_only():
@@ -238,7 +209,7 @@ def test_another_braid_angle_is_that_of_every_experiment_inside_it_only():
     ("chapter", "say"), [("chapter3", chapter3.say), ("chapter5", chapter5.say)]
 )
 def test_each_statement_counts_once_and_no_pattern_is_idle(chapter, say, monkeypatch):
-    stored = read_csv(DOCS / chapter / "facts.csv")
+    stored = facts(chapter)
     made = [judge(row["group"], row["fact"], "1", 1.0, 1.0) for row in stored]
     for row, one in zip(stored, say.scored(made), strict=True):
         assert row["apart"] == one.apart or row["group"] == chapter3.say.groups["braid"]
@@ -275,21 +246,9 @@ def test_every_fact_has_a_source_in_the_chapter(rows):
         )
     assert len({(row.group, row.fact) for row in rows}) == len(rows)
     places = " ".join(row.where for row in rows)
-    for place in (
-        "Table 3.1",
-        "Table 3.2",
-        "Table 3.3",
-        "3.2.2",
-        "3.2.3",
-        "3.2.4",
-        "3.2.5",
-        "3.3.2",
-        "3.4",
-        "3.5",
-        "3.6",
-        "Fig. 3.16",
-    ):
+    for place in ["3.2.2", "3.2.3", "3.2.4", "3.2.5", "3.3.2", "3.4", "3.5", "3.6"]:
         assert place in places
+    assert all(name in places for name in ("Table 3.1", "Table 3.2", "Table 3.3", "Fig. 3.16"))
 
 
 def test_verdicts_of_the_chapter(rows):
@@ -324,36 +283,20 @@ def test_the_printed_torque_law_is_what_fits_and_the_table_says_so(rows):
 
 def test_every_number_chosen_is_the_rigs_and_says_from_where():
     rig = rigs.named("elbow")
-    assert [
-        name
-        for name, _, reason in chapter3.chosen()
-        if name not in rig.parameters or len(reason) < 10
-    ] == []
+    for name, _, reason in chapter3.chosen():
+        assert name in rig.parameters
+        assert len(reason) >= 10, name
     lines = (Path(rigs.__file__).parent / "elbow.toml").read_text(encoding="utf-8").splitlines()
-    for name in (
-        "discharge_area_max",
-        "dead_volume",
-        "inertia",
-        "first_moment",
-        "viscous",
-        "coulomb",
-        "max_angle",
-        "volume",
-    ):
+    own = "discharge_area_max dead_volume inertia first_moment viscous coulomb max_angle volume"
+    for name in own.split():
         line = next(line for line in lines if line.startswith(f"{name} "))
         assert "#" in line, f"{name} has no origin"
 
 
 def test_page_in_the_documentation_is_what_the_command_makes(rows):
-    stored = {(row["group"], row["fact"]): row for row in read_csv(DOCS / "chapter3" / "facts.csv")}
+    stored = by_fact("chapter3")
     for row in rows:
         there = stored[row.group, row.fact]
         assert there["verdict"] == row.verdict
-        assert float(there["ours"] or "nan") == pytest.approx(
-            row.ours, rel=1e-4, abs=1e-6, nan_ok=True
-        )
-    text = (DOCS / "chapter3.md").read_text(encoding="utf-8")
-    assert "`make reproduce`" in text.splitlines()[2]
-    links = re.findall(r"\]\(([^)]+\.png)\)", text)
-    assert len(links) >= 8
-    assert all((DOCS / link).is_file() for link in links)
+        ours = float(there["ours"] or "nan")
+        assert ours == pytest.approx(row.ours, rel=1e-4, abs=1e-6, nan_ok=True)

@@ -2,17 +2,16 @@
 the short experiments.
 """
 
-import csv
 import math
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from reproduction import chapter6, recruiting
 from reproduction.recruiting import CYCLE, Cycles, lifting, plant
+from tests.reproduction.pages import by_fact
 
-DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 #: Statements of which ours differ; one that changes sides must be noticed.
 DIFFER = {
     "air in two muscles at half the pressure over that in one, 4 and 8 bar",
@@ -36,11 +35,8 @@ def cycles(tops=((90.0, 90.0),), fall=1e5):
     for row, tried in enumerate(tops):
         for k, top in enumerate(tried):
             now = time - CYCLE * k
-            up, hold, down = (
-                (now >= 0.0) & (now < 6.0),
-                (now >= 6.0) & (now < 11.0),
-                ((now >= 11.0) & (now < 17.0)),
-            )
+            ends = ((0.0, 6.0), (6.0, 11.0), (11.0, 17.0))
+            up, hold, down = ((now >= begin) & (now < end) for begin, end in ends)
             reach = math.radians(top - 15.0)
             angle[row, up] += reach * now[up] / 6.0
             angle[row, hold] += reach
@@ -48,17 +44,8 @@ def cycles(tops=((90.0, 90.0),), fall=1e5):
             torque[row, down] = 50.0
     source = np.linspace(13e5, 13e5 - fall, time.size) + np.zeros_like(angle)
     cases = tuple((9.0, n) for n in (2, 4, 6)[: len(tops)])
-    return Cycles(
-        cases,
-        90.0,
-        0.015,
-        time,
-        angle,
-        torque,
-        np.full(angle.shape, 5e5),
-        source,
-        np.zeros(len(tops), dtype=bool),
-    )
+    pressure, failed = np.full(angle.shape, 5e5), np.zeros(len(tops), dtype=bool)
+    return Cycles(cases, 90.0, 0.015, time, angle, torque, pressure, source, failed)
 
 
 # ------------------------------------------------------------------- work and input
@@ -88,17 +75,7 @@ def test_best_number_follows_most_cycles_before_it_is_efficient():
     torque = found.torque.copy()
     torque[0] *= 9.0
     torque[1] *= 0.5
-    other = Cycles(
-        found.cases,
-        90.0,
-        0.015,
-        found.time,
-        found.angle,
-        torque,
-        found.pressure,
-        found.source,
-        found.failed,
-    )
+    other = replace(found, torque=torque)
     assert chapter6.best_number(other, 9.0) == (6, 2)
     assert chapter6.best_number(found, 9.0)[1] == 2
 
@@ -140,10 +117,9 @@ def test_arm_of_the_test_matrix_is_just_not_lifted():
 
     least, most = chapter6._moments()
     assert most - least == pytest.approx(9.0 * 0.9)
-    rig = plant(18.0, 2).with_parameters({"arm.first_moment": least + 0.01})
-    assert not lift(rig, pressure=11.8e5, to=math.radians(90.0)).can_lift
-    rig = plant(18.0, 2).with_parameters({"arm.first_moment": least - 0.01})
-    assert lift(rig, pressure=11.8e5, to=math.radians(90.0)).can_lift
+    for more, lifted in ((0.01, False), (-0.01, True)):
+        rig = plant(18.0, 2).with_parameters({"arm.first_moment": least + more})
+        assert lift(rig, pressure=11.8e5, to=math.radians(90.0)).can_lift == lifted
 
 
 # ---------------------------------------------------------------------------- the page
@@ -162,18 +138,12 @@ def test_short_experiments_fill_the_page():
     assert all(chapter6.in_short(rows))
     tables = chapter6.tables()
     assert set(tables) <= set(chapter6.say.groups.values())
-    with (DOCS / "chapter6" / "facts.csv").open(encoding="utf-8", newline="") as stream:
-        stored = {(row["group"], row["fact"]): row for row in csv.DictReader(stream)}
+    stored = by_fact("chapter6")
     assert list(stored) == [(row.group, row.fact) for row in rows]
-    whole = {
-        fact
-        for (_, fact), row in stored.items()
-        if row["verdict"] == "differs" and not row["apart"]
-    }
-    assert whole == DIFFER | {
-        "largest payload that follows every cycle",
-        "number of muscles at 63 kg",
-    }
+    counted = [row for row in stored.values() if not row["apart"]]
+    whole = {row["fact"] for row in counted if row["verdict"] == "differs"}
+    more = {"largest payload that follows every cycle", "number of muscles at 63 kg"}
+    assert whole == DIFFER | more
     from reproduction.chapter6_figures import pictures
 
     for picture in pictures():

@@ -2,23 +2,20 @@
 row, and reasons of differences.
 """
 
-import csv
 import re
 from collections import Counter
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pamrs.comparison import BASES, KINDS, judge
 from reproduction import CHAPTERS, chapter4, chapter5, chapter5_comparison, tracking
-from reproduction.chapter4_statements import on_stop, restless
+from reproduction.chapter4_statements import on_stop, restless, statements
 from reproduction.lift import GAINS, Map
+from tests.reproduction.pages import facts, page_of
 from tests.reproduction.test_chapter4 import made, verdicts
 from tests.tables import rows_of
 
-DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 #: Sentences that state several numbers or orders, each of which is a row.
 SEVERAL = (
     "the efficiency range jumps from 10-30% to 52-66%",
@@ -32,10 +29,8 @@ SEVERAL = (
 )
 
 
-@cache
 def stored(chapter):
-    with (DOCS / chapter / "facts.csv").open(encoding="utf-8", newline="") as stream:
-        return [row for row in csv.DictReader(stream) if not row["apart"]]
+    return [row for row in facts(chapter) if not row["apart"]]
 
 
 def found(chapter, fact):
@@ -67,13 +62,11 @@ def test_every_row_has_one_kind(chapter):
 
 @pytest.mark.parametrize("chapter", CHAPTERS.values())
 def test_difference_has_its_reason_or_says_that_none_is_known(chapter):
-    text = (DOCS / f"{chapter}.md").read_text(encoding="utf-8")
+    text = page_of(chapter)
     for row in stored(chapter):
         if row["kind"] == "differs":
-            shown = re.search(
-                rf"^- \[\d+\] {re.escape(row['fact'])}: (.+)$", text, flags=re.MULTILINE
-            )
-            assert shown, row["fact"]
+            line = rf"^- \[\d+\] {re.escape(row['fact'])}: (.+)$"
+            assert re.search(line, text, flags=re.MULTILINE), row["fact"]
             assert row["reason"] or "reason not known" in text
 
 
@@ -88,16 +81,15 @@ def test_rows_of_chapter_4_say_what_does_not_come_to_rest_and_so_does_its_page()
     rows = found("chapter4", r"FF\+PID: .*")
     assert len(rows) == 3
     assert all("too slow to settle): FF+PID" in row["note"] for row in rows)
-    text = (DOCS / "chapter4.md").read_text(encoding="utf-8")
+    text = page_of("chapter4")
     assert "FF+PID 22.7 (23 kg), 43.3 (34 kg)" in text
     assert "kP of the PID may grow by" in text
 
 
 def test_pages_of_chapters_5_and_6_have_their_margins():
-    text = (DOCS / "chapter5.md").read_text(encoding="utf-8")
-    assert "| 0 lb | 1.48 | 0.98 |" in text
-    text = (DOCS / "chapter6.md").read_text(encoding="utf-8")
-    runs = re.findall(r"^\| ([^|]+) \| \d+ \| (\d\.\d\d) \| ([\d.]+) \|", text, re.MULTILINE)
+    assert "| 0 lb | 1.48 | 0.98 |" in page_of("chapter5")
+    line = r"^\| ([^|]+) \| \d+ \| (\d\.\d\d) \| ([\d.]+) \|"
+    runs = re.findall(line, page_of("chapter6"), re.MULTILINE)
     assert len(runs) == 29
     assert all(float(inner) > 1.9 for _, inner, _ in runs)
     below = {name for name, _, whole in runs if float(whole) < 1.0}
@@ -127,8 +119,6 @@ def test_overshoot_onto_the_stop_decides_nothing():
 
 
 def test_run_that_does_not_come_to_rest_is_said_in_its_rows():
-    from reproduction.chapter4_statements import statements
-
     runs = dict.fromkeys(GAINS, made()) | {"FF+PID": made(swing=3.0)}
     told = {row.fact for row in statements("g", runs) if "not at rest in the hold" in row.note}
     assert {fact for fact in told if fact.startswith("FF+PID")} == {
@@ -165,8 +155,7 @@ def test_triangle_at_phase_0_begins_at_its_mean_and_is_else_the_experiments():
     assert 15.0 < printed.min() < printed.max() < 110.0
     assert used.min() < 15.0
     quarter = round(0.25 / 0.16 / tracking.PERIOD)
-    cosines = sum(
-        a * np.cos(w * np.arange(used.size) * tracking.PERIOD) for a, w in chapter5._table()
-    )
+    time = tracking.PERIOD * np.arange(used.size)
+    cosines = sum(a * np.cos(w * time) for a, w in chapter5._table())
     shifted = (used - cosines)[quarter:]
     assert np.abs(shifted - (printed - cosines)[: shifted.size]).max() < 0.05

@@ -31,6 +31,7 @@ def told(result: dict[str, Any], *considered: tuple[float | None, float]) -> dic
     return result | {"considered": found}
 
 
+NOWHERE = {"left": None, "probability": 0.0, "blocks": []}
 #: truth, what was said, what is said with the truth inserted, and what failed
 CASES = {
     "right": ([LEAK], ["leak_muscle"], None, ""),
@@ -38,12 +39,7 @@ CASES = {
     "light": ([CREEP], ["heat"], told(result_of("effects", ["heat"]), (0.2, 0.1)), WEIGHT),
     "odd": ([CREEP], [], told(result_of("unlisted"), (0.1, 0.1), (0.8, 0.1)), FORM),
     "inside": ([CREEP], [], told(result_of("unlisted"), (None, 0.0)), UNFIT),
-    "quiet": (
-        [LEAK],
-        [],
-        result_of("none") | {"considered": [{"left": None, "probability": 0.0, "blocks": []}]},
-        QUIET,
-    ),
+    "quiet": ([LEAK], [], result_of("none") | {"considered": [NOWHERE]}, QUIET),
     "broken": ([LEAK], [], None, FAILED),
     "listed nowhere": ([HOSE], ["muscle_creep"], None, ""),
 }

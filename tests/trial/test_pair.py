@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.simulation import replay
+from tests.trial import test_cases as cases
+from tests.trial.test_cases import again, group
 from trial.bench import Bench
 from trial.cases import _truths, make
 from trial.concealed import store
 from trial.design import PAIRS, ROUND, Spec, possible, specs
+from trial.drive import FREE
 from trial.effects import Effects, Setting, draw
 from trial.effects.chamber import Leak
 from trial.effects.sensors import PressureLag
@@ -20,10 +22,10 @@ from trial.effects.valve import InputLag
 from trial.errors import KINDS, pair_errors, stated_lines
 from trial.families import BY_LABEL, KNOWN, LATER, OTHER
 from trial.inserted import truth_of
-from trial.labs import Lab, noise_of, table
+from trial.labs import Lab, noise_of
 from trial.marks import covered, mark
 from trial.pair.bench import PairBench
-from trial.pair.course import FIT, FREE, HELD, PairDriver
+from trial.pair.course import FIT, HELD, PairDriver
 from trial.pair.places import BOTH, PLACES, SIDES, Placed, has_place
 from trial.pair.plant import PairPlant, pair_parameters
 from trial.pair.recording import CHANNELS, PairPath
@@ -52,20 +54,6 @@ def bench_of(spec, **noise):
 
 
 # ------------------------------------------------------------------------------------- plant
-
-
-def again(record, rig, path, lab, known=None):
-    """What pamrs makes of a recording from its first values, over the range of each channel."""
-    text, channels = table(record, rig, lab, [], 0.0)
-    (path / "one.csv").write_text(text)
-    recording = pamrs.load_recording(path / "one.csv")
-    simulated = replay(known or pamrs.load_rig(rig.path), recording)
-    return {
-        name: np.abs(np.asarray(simulated[name]) - recording.channels[name]).max()
-        / np.ptp(recording.channels[name])
-        for name in channels
-        if "command" not in name
-    }
 
 
 @pytest.mark.parametrize("name", [*FIT, *HELD, FREE])
@@ -180,13 +168,8 @@ def test_known_forms_are_those_of_the_catalogue(form, tmp_path):
     effect = form.draw(np.random.default_rng(4), Setting(2, 6.0))
     plain, records = bench.run(()), bench.run((effect,))
     truth = form.truths(effect, bench.par)
-    rig = pamrs.load_rig(RIGS["elbow"].path)
-    usual = "" if form.name != "straight" else "straight"
-    known = (
-        rig.with_effect(form.family, truth, form=usual)
-        if usual
-        else rig.with_effect(form.family, truth)
-    )
+    usual = {"form": "straight"} if form.name == "straight" else {}
+    known = pamrs.load_rig(RIGS["elbow"].path).with_effect(form.family, truth, **usual)
     for i, record in records.items():
         errors = again(record, RIGS["elbow"], tmp_path, spec.lab, known)
         without = again(record, RIGS["elbow"], tmp_path, spec.lab)
@@ -227,11 +210,9 @@ def test_the_plan_of_pairs():
     assert {s.rig for s in found} == {PAIR}
     at = [place for s in found for place in s.places]
     assert set(at) == {*PLACES, ""}
-    assert all(
-        bool(place) == has_place(BY_LABEL[f].family, BY_LABEL[f].block)
-        for s in found
-        for f, place in zip(s.forms, s.places, strict=True)
-    )
+    for s in found:
+        for form, place in zip((BY_LABEL[f] for f in s.forms), s.places, strict=True):
+            assert bool(place) == has_place(form.family, form.block)
     names = {name for s in found for name, _ in s.wrong}
     assert {"valve.flexor.discharge_area_max", "muscle.extensor.modulus_scale"} <= names
     for s in found:
@@ -258,14 +239,8 @@ def case():
     lab = Lab(100, 16, dropouts=True)
     recordings = (("multisine", "fit"), ("antagonistic_steps", "held_out"))
     forms = ("leak_muscle/laminar", "joint_end_stop/progressive")
-    return make(
-        replace(
-            spec_of(lab=lab, forms=forms, strength=10.0, percent=1, stated=True),
-            places=("extensor", ""),
-            recordings=recordings,
-            plan=PAIRS,
-        )  # fmt: skip
-    )
+    spec = spec_of(lab=lab, forms=forms, strength=10.0, percent=1, stated=True)
+    return make(replace(spec, places=("extensor", ""), recordings=recordings, plan=PAIRS))
 
 
 def test_a_case_tells_where_its_effects_act_and_loads(case, tmp_path):
@@ -311,35 +286,24 @@ def test_wrong_parameters_of_named_blocks():
 # ------------------------------------------------------------------------------------ scores
 
 
-def group(blocks, verdict, named=(), p=0.9):
-    return {
-        "blocks": blocks, "verdict": verdict, "effects": list(named), "ambiguity": [],
-        "probabilities": {"+".join(named) or verdict: p}, "wrong_parameters": [],
-    }  # fmt: skip
-
-
 def result_of(*named, share=0.9):
     """Effects as id and place, and a healthy chamber beside the other one."""
     terms = [f"{name}@{at}" if at else name for name, at in named]
     sides = [at or "extensor" for _, at in named]
-    return {
-        "schema": "pamrs.diagnosis/1", "verdict": "effects" if named else "none", "seconds": 1.0,
-        "effects": [
-            {"id": name, **({"at": at} if at else {}), "probability": 0.9, "parameters": {}}
-            for name, at in named
-        ],
-        "wrong_parameters": [], "probabilities": {"+".join(terms) or "none": 0.9},
-        "ambiguity": [],
-        "blocks": [
-            group([f"chamber.{side}"], "effects" if side in sides else "none",
-                  [t for t, s in zip(terms, sides, strict=True) if s == side])
-            for side in SIDES
-        ],
-        "budget": [
-            {"block": f"chamber.{side}", "kind": "effect", "id": name, "share": share}
-            for (name, _), side in zip(named, sides, strict=True)
-        ],
-    }  # fmt: skip
+    groups = []
+    for side in SIDES:
+        own = [t for t, s in zip(terms, sides, strict=True) if s == side]
+        groups.append(group([f"chamber.{side}"], "effects" if own else "none", own))
+    budget = [
+        {"block": f"chamber.{side}", "kind": "effect", "id": name, "share": share}
+        for (name, _), side in zip(named, sides, strict=True)
+    ]
+    said = cases.result_of("effects" if named else "none", groups=groups, budget=budget)
+    effects = [
+        {"id": name, **({"at": at} if at else {}), "probability": 0.9, "parameters": {}}
+        for name, at in named
+    ]
+    return said | {"effects": effects, "probabilities": {"+".join(terms) or "none": 0.9}}
 
 
 @pytest.mark.parametrize(

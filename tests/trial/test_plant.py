@@ -37,8 +37,7 @@ MECHANICAL = {name for name, kind in TYPES.items() if kind.block in ("muscle", "
 def cycle():
     """An open-loop recording and a sealed one after it, once for all effects."""
     rng = np.random.default_rng(3)
-    shape, control, command = prepare(BARE, "open_cycles", 10.0, rng)
-    return shape, control, command
+    return prepare(BARE, "open_cycles", 10.0, rng)
 
 
 def moved(effects, cycle, supply=13.6e5):
@@ -82,24 +81,17 @@ def test_effect_moves_its_channel(name, cycle):
         effect = replace(effect, onset=0.008)
     record, far = moved(Effects(effect), cycle)
     assert all(np.isfinite(v) for v in far.values())
-    channel = (
-        "supply_pressure"
-        if name in SUPPLY
-        else "muscle_pressure"
-        if name.startswith("pressure")
-        else "joint_angle"
-    )
-    if name == "clock_skew":
-        channel = "muscle_pressure"
+    gauge = name == "clock_skew" or name.startswith("pressure")
+    channel = "muscle_pressure" if gauge else "joint_angle"
+    channel = "supply_pressure" if name in SUPPLY else channel
     assert far[channel] > 0.5
     if name in SUPPLY:
         assert far[channel] > far["muscle_pressure"]
     if TYPES[name].block == "sensors" and name != "clock_skew":
         # a transducer changes its own channel and nothing of the plant
         plain, _ = moved(Effects(), cycle)
-        assert np.array(record.states)[:, :4] == pytest.approx(
-            np.array(plain.states)[:, :4], rel=1e-6, abs=1e-6
-        )
+        own, bare = (np.array(one.states)[:, :4] for one in (record, plain))
+        assert own == pytest.approx(bare, rel=1e-6, abs=1e-6)
         assert sorted(far.values())[1] < 0.03
     if name in MECHANICAL:
         assert far["supply_pressure"] < 0.05
@@ -114,17 +106,14 @@ def test_names_are_those_of_the_catalogue():
     assert set(LISTED) == set(CATALOGUE) - lacking
     assert len(UNLISTED) >= 6
     assert not set(LISTED) & set(UNLISTED)
-    assert all(
-        TYPES[name].id == name and TYPES[name].graded and TYPES[name].block for name in TYPES
-    )
+    assert all(kind.id == name and kind.graded and kind.block for name, kind in TYPES.items())
 
 
 def test_integrator_is_accurate():
     assert against_fine(BARE, 4.0) < 1.0e-7
     # states of every kind: gas temperature, friction, spool, swing
-    effects = Effects(
-        *(effect_of(n) for n in ("heat_transfer", "muscle_hysteresis", "payload_swing"))
-    )
+    names = ("heat_transfer", "muscle_hysteresis", "payload_swing")
+    effects = Effects(*map(effect_of, names))
     assert against_lsoda(Plant(PAR, effects), 1.5) < 1.0e-5
 
 
@@ -132,24 +121,15 @@ def test_swinging_payload_obeys_the_double_pendulum():
     swing = PayloadSwing(share=0.4, length=0.3, drag=0.0, loss=0.0)
     plant = Plant(PAR, Effects(swing))
     angle, rate, phi, spin, torque = 0.7, 0.5, 0.2, -0.8, 12.0
-    inertia, weight = (
-        PAR.inertia + PAR.payload * PAR.length**2,
-        (PAR.first_moment + PAR.payload * PAR.length) * PAR.gravity,
-    )
-    d = [0.0] * plant.size
-    alpha = swing.motion(plant.env, 4)(
-        torque, angle, rate, inertia, weight, [0.0, 0.0, angle, rate, phi, spin], d
-    )
+    inertia, weight = PAR.inertia + PAR.payload * PAR.length**2, PAR.weight
+    d, y = [0.0] * plant.size, [0.0, 0.0, angle, rate, phi, spin]
+    alpha = swing.motion(plant.env, 4)(torque, angle, rate, inertia, weight, y, d)
     mass, lever = 0.4 * PAR.payload, 0.4 * PAR.payload * PAR.length * 0.3
     c, s = math.cos(angle - phi), math.sin(angle - phi)
-    assert inertia * alpha + lever * (d[5] * c + spin**2 * s) + weight * math.sin(
-        angle
-    ) == pytest.approx(torque)
-    hanging = (
-        mass * 0.3**2 * d[5]
-        + lever * (alpha * c - rate**2 * s)
-        + mass * PAR.gravity * 0.3 * math.sin(phi)
-    )
+    swung, weighs = lever * (d[5] * c + spin**2 * s), weight * math.sin(angle)
+    assert inertia * alpha + swung + weighs == pytest.approx(torque)
+    hanging = mass * 0.3**2 * d[5] + lever * (alpha * c - rate**2 * s)
+    hanging += mass * PAR.gravity * 0.3 * math.sin(phi)
     assert hanging == pytest.approx(0.0, abs=1e-9)
 
 
@@ -158,11 +138,8 @@ def test_full_heat_transfer_conserves_gas():
     y, step = plant.rest(14.0e5), 1.0e-3
 
     def mass(state):
-        return (
-            state[0]
-            * (plant.tables.at(state[2])[2] + PAR.dead_volume)
-            / (PAR.gas_constant * state[4])
-        )
+        volume = plant.tables.at(state[2])[2] + PAR.dead_volume
+        return state[0] * volume / (PAR.gas_constant * state[4])
 
     y, step = plant.advance(y, 0.1, 1.0, step)
     full, hot = mass(y), y[4]

@@ -22,23 +22,21 @@ def trial(tmp_path):
         text = json.dumps(key_of(name, [LEAK]))
         (tmp_path / "keys" / f"{name}.json").write_text(text)
         digests[name] = hashlib.sha256(text.encode()).hexdigest()
-    (tmp_path / "manifest.json").write_text(
-        json.dumps({"schema": "pamrs.trial-manifest/1", "keys": digests})
-    )
+    told = {"schema": "pamrs.trial-manifest/1", "keys": digests}
+    (tmp_path / "manifest.json").write_text(json.dumps(told))
     return tmp_path
 
 
-def scored(trial):
-    return main(["score", "--keys", str(trial / "keys"), "--results", str(trial / "results")])
+def scored(trial, *words):
+    place = ["--keys", str(trial / "keys"), "--results", str(trial / "results")]
+    return main(["score", *place, *words])
 
 
 def test_intervals():
     assert median_interval([1.0] * 5) is None
     assert median_interval([float(v) for v in range(6)]) == (0.0, 5.0)
-    assert median_interval([float(v) for v in range(20)]) == (
-        5.0,
-        14.0,
-    )  # ranks 6 and 15 of 20, as tabulated
+    # ranks 6 and 15 of 20, as tabulated
+    assert median_interval([float(v) for v in range(20)]) == (5.0, 14.0)
     assert mean_interval([1.0, 2.0] * 50) == pytest.approx((1.5 - 0.0985, 1.5 + 0.0985), abs=1e-4)
 
 
@@ -66,8 +64,7 @@ def test_nothing_named_closes_nothing():
 
 def test_the_tables_say_how_the_trial_was_made(trial, capsys):
     words = ["--command", "make prove CASES=2", "--markdown", str(trial / "t.md")]
-    place = ["--keys", str(trial / "keys"), "--results", str(trial / "results")]
-    assert main(["score", *place, *words]) == 0
+    assert scored(trial, *words) == 0
     text = (trial / "t.md").read_text()
     assert text in capsys.readouterr().out
     assert "make prove CASES=2" in text
@@ -86,9 +83,8 @@ def test_keys_must_be_those_that_were_published(trial, capsys):
 
 
 def test_results_must_be_of_this_trial(trial, capsys):
-    (trial / "results" / "run.json").write_text(
-        json.dumps({"manifest_sha256": "0" * 64, "cases": {}})
-    )
+    other = {"manifest_sha256": "0" * 64, "cases": {}}
+    (trial / "results" / "run.json").write_text(json.dumps(other))
     assert scored(trial) == 2
     assert "another manifest" in capsys.readouterr().err
 

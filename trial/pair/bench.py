@@ -10,13 +10,13 @@ import numpy as np
 from ..bench import Bench
 from ..effects import Effect
 from ..plant import Parameters
-from ..recording import Array, Record
+from ..recording import Array, Record, follow
 from ..rig_kinds import nominal_pair
 from ..rigfile import split
 from .course import PairDriver, pair_course
 from .places import SIDES, Placed
 from .plant import PairParameters, PairPlant, pair_parameters
-from .recording import CHANNELS, KINDS, follow_pair, run_pair
+from .recording import CHANNELS, KINDS, PairPath, run_pair
 
 
 class PairBench(Bench):
@@ -67,7 +67,7 @@ class PairBench(Bench):
         section, key = split(name)
         zero = {"pressure_zero": section.removeprefix("sensors."), "angle_zero": "angle"}.get(key)
         shift = tuple(-step if zero == own else 0.0 for own in (*SIDES, "angle"))
-        return follow_pair(plant, record, index, shift, sample_time=self.step)
+        return follow(plant, record, index, shift, sample_time=self.step, way=PairPath)
 
     @property
     def shown(self) -> list[int]:

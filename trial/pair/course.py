@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drive import FREE, course, range_of
+from ..drive import course, range_of
 from ..excitation import Excitation, Loop
 from ..rig_kinds import RigKind
 from .places import SIDES
@@ -162,6 +162,3 @@ class PairDriver(Loop):
             gap = min(max(wanted, LEAST), self.most) - measured[j]
             sent.append(self.opened(gap, self.null[j], float(course.dither[index, j])))
         return sent[0], sent[1]
-
-
-__all__ = ["CO", "FIT", "FREE", "HELD", "STEPS", "PairCourse", "PairDriver", "pair_course"]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import accumulate
 
 import numpy as np
 
 from ..effects import RECORDING_PERIOD
-from ..recording import SAMPLE_TIME, Array, CommandPath, Noise, Record, late
+from ..recording import SAMPLE_TIME, CommandPath, Noise, Record, recorded
 from ..solver import State
 from .course import PairCourse
 from .places import SIDES
@@ -24,10 +23,15 @@ Steering = Callable[[int, tuple[float, ...]], Commands]
 
 
 class PairPath:
-    """What both commands go through on their way to the openings of the valves."""
+    """What both commands go through on their way to the openings of the valves; as
+    :class:`trial.recording.CommandPath`.
+    """
+
+    kinds = KINDS
+    shut = (0.0, 0.0)
 
     def __init__(self, plant: PairPlant, sample_time: float = SAMPLE_TIME) -> None:
-        self.sample_time = sample_time
+        self.plant, self.sample_time, self.clocks = plant, sample_time, plant.shared.effects
         self.paths = [CommandPath(p, sample_time) for p in (plant.flexor, plant.extensor)]
 
     def spans(self, commands: Commands, time: float) -> list[tuple[Commands, float]]:
@@ -44,6 +48,13 @@ class PairPath:
                 found.append(((first, second), end - begin))
                 begin = end
         return found
+
+    def begun(self, state: State, shift: tuple[float, ...], tank: State, clock: float) -> State:
+        """State of the pair at a time [s] as that of another one, but for its tank, with shifts of
+        both pressures [Pa] and the angle [rad].
+        """
+        pressures = (state[0] + shift[0], state[1] + shift[1])
+        return self.plant.initial(pressures, tank[2], state[3] + shift[2], state[4], clock)
 
 
 def _ends(spans: list[tuple[float, float]]) -> list[float]:
@@ -70,63 +81,10 @@ def run_pair(
     held: int = 1,
 ) -> Record:
     """One recording of a pair, from rest; arguments as those of :func:`trial.recording.run`."""
-    n = len(course.reference)
-    spread = np.array([(noise.pressure, noise.angle)[k == 2] for k in KINDS])
-    grid = np.array([(noise.pressure_step, noise.angle_step)[k == 2] for k in KINDS])
-    white = rng.standard_normal((n, len(KINDS))) * spread
-    noisy, steps = white.tolist(), grid.tolist()
-    sent: list[Commands] = []
-    clean: list[tuple[float, ...]] = []
-    states: list[State] = []
+    y = plant.rest(supply + plant.par.ambient, RECORDING_PERIOD * index)
+
+    def steer(i: int, measured: Iterator[float]) -> Commands:
+        return steering(i, tuple(measured))
+
     path = PairPath(plant, sample_time)
-    begin = RECORDING_PERIOD * index
-    y = plant.rest(supply + plant.par.ambient, begin)
-    opening, step, u = (0.0, 0.0), 1.0e-3, (0.0, 0.0)
-    for i in range(n):
-        y = plant.tick(y)
-        states.append(y)
-        reading = plant.reading(y, opening)
-        clean.append(reading)
-        if i % held == 0:
-            measured = zip(reading, noisy[i], steps, strict=True)
-            u = steering(i, tuple(round((v + e) / s) * s for v, e, s in measured))
-        sent.append(u)
-        for opening, span in path.spans(u, begin + i * sample_time):
-            y, step = plant.advance(y, opening, span, step)
-    time = sample_time * np.arange(n)
-    true = late(plant.shared.effects, time, np.array(clean), KINDS)
-    return Record(time, np.array(sent), np.round((true + white) / grid) * grid, true, states)
-
-
-def follow_pair(
-    bare: PairPlant,
-    record: Record,
-    index: int = 0,
-    shift: tuple[float, ...] = (0.0, 0.0, 0.0),
-    window: float = 2.0,
-    sample_time: float = SAMPLE_TIME,
-) -> Array:
-    """Noise-free readings (n, 4) of a pair that gets the commands of a recording of another one;
-    as :func:`trial.recording.follow`, with shifts of both pressures [Pa] and the angle [rad].
-    """
-    every = round(window / sample_time)
-    parts = max(1, math.ceil(sample_time / 6.0e-3))
-    found: list[tuple[float, ...]] = []
-    path = PairPath(bare, sample_time)
-    begin = RECORDING_PERIOD * index
-    opening = (0.0, 0.0)
-    y: State = []
-    for i, (state, (first, second)) in enumerate(
-        zip(record.states, record.command.tolist(), strict=True)
-    ):
-        clock = begin + i * sample_time
-        if i % every == 0:
-            supply = y[2] if y else state[2]
-            pressures = (state[0] + shift[0], state[1] + shift[1])
-            y = bare.initial(pressures, supply, state[3] + shift[2], state[4], clock)
-        y = bare.tick(y)
-        found.append(bare.reading(y, opening))
-        for opening, span in path.spans((first, second), clock):
-            for _ in range(parts):
-                y = bare.classical(y, opening, span / parts)
-    return late(bare.shared.effects, record.time, np.array(found), KINDS)
+    return recorded(path, steer, len(course.reference), y, noise, rng, index, held)
