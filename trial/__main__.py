@@ -12,6 +12,7 @@ from pathlib import Path
 
 from .concealed import make_case, write
 from .design import PLANS, ROUND, SECOND, specs
+from .diagram import reliability_diagram
 from .effects import KINDS
 from .inserted import all_inserted
 from .inserted import table as insertion_table
@@ -113,6 +114,7 @@ def _add_pool(add: Add) -> None:
     several.add_argument("--only", default="", help="trials whose name begins with these letters")
     several.add_argument("--cases", type=Path, help=f"write all cases as one table here ({CASES})")
     several.add_argument("--markdown", type=Path, help="write the tables here")
+    several.add_argument("--diagram", type=Path, help="write the reliability diagram here (SVG)")
     several.set_defaults(run=_pool)
 
 
@@ -122,6 +124,8 @@ def _pool(args: argparse.Namespace) -> None:
         if not args.cases.name.endswith(CASES):
             raise ValueError(f"--cases {args.cases}: the name must end in {CASES}")
         args.cases.write_bytes(table_of_cases(trials))
+    if args.diagram is not None:
+        reliability_diagram([mark for marks in trials.values() for mark in marks], args.diagram)
     _shown(pooled_page(trials), args.markdown)
 
 

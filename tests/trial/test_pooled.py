@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from trial.__main__ import main
+from trial.diagram import reliability_diagram
 from trial.pooled import page, pooled, table_of_cases
 from trial.tables import scores, to_json
 
@@ -73,6 +74,20 @@ def test_the_published_page_has_the_numbers_of_the_table():
     assert targets
     for name, *rest in targets:
         assert any(row[0] == name and list(row[2:]) == rest for row in known)
+
+
+def test_the_published_diagram_is_of_the_published_cases(tmp_path):
+    """Counts of groups and the mean distance from what was stated, as it writes them."""
+
+    def words(file):
+        return re.findall(r"<text[^>]*>([^<]*)<", file.read_text())
+
+    drawn = tmp_path / "drawn.svg"
+    main(["pool", str(TABLE), "--only", "second_plan_seed_2026", "--diagram", str(drawn)])
+    assert words(drawn) == words(PROOF / "reliability.svg")
+    assert {"216", "11.8 points off in the mean"} <= set(words(drawn))
+    with pytest.raises(ValueError, match="nothing to draw"):
+        reliability_diagram([], drawn)
 
 
 def test_what_is_no_score_is_refused(files, tmp_path):
