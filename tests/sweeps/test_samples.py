@@ -114,6 +114,8 @@ def test_the_indices_of_a_sum_are_the_shares_of_its_variance(tmp_path):
     assert found.attrs["runs"] == 512 * 4
     assert found.attrs["groups_used"] == 512
     assert found["p.ST"].attrs["units"] == "1"
+    again = shares(tmp_path, "sobol", 512)
+    assert again["p.ST_conf"].values.tolist() == found["p.ST_conf"].values.tolist()
 
 
 def test_elementary_effects_of_a_sum_are_its_ranges(tmp_path):

@@ -63,7 +63,7 @@ def sensitivity(
     n : int
         Base samples, of Sobol a power of two; or trajectories.
     seed : int
-        The same seed gives the same runs.
+        The same seed gives the same runs, indices and confidence.
     store : path-like
         Of the sweep; the same call goes on where the last one ended.
     **runs
@@ -142,7 +142,8 @@ def _analysed(method: str, cube: Array, values: Array, seed: int) -> dict[str, A
     if np.ptp(values) == 0.0:
         return {index: np.full(dimensions, np.nan) for index in METHODS[method]}
     given = (values,) if method == "sobol" else (cube, values)
-    found = _salib("analyze", method, dimensions, *given, seed=seed)
+    # SALib takes a seed of 0 for none
+    found = _salib("analyze", method, dimensions, *given, seed=seed or 1)
     return {index: np.asarray(found[index], dtype=np.float64) for index in METHODS[method]}
 
 
