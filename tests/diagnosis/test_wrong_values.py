@@ -56,10 +56,6 @@ def slow(*case: object) -> object:
     return pytest.param(*case, marks=pytest.mark.slow)
 
 
-# The late valve leads, but with the heat of the wall (0.52); `unlisted` has 0.48.
-BESIDE_HEAT = [pytest.mark.slow, pytest.mark.xfail(reason="named with the heat of the wall")]
-
-
 @pytest.mark.parametrize(
     ("stand", "name", "true", "rel"),
     [
@@ -68,7 +64,7 @@ BESIDE_HEAT = [pytest.mark.slow, pytest.mark.xfail(reason="named with the heat o
         slow("spring and tilted base", "joint.stiffness", 35.0, 0.1),
         slow("spring and tilted base", "arm.base_angle", math.radians(-20.0), 0.1),
         slow("spool", "valve.natural_frequency", 15.0, 0.05),
-        pytest.param("pulsed valves", "valve.fill.closing_delay", 4e-3, 0.1, marks=BESIDE_HEAT),
+        slow("pulsed valves", "valve.fill.closing_delay", 4e-3, 0.1),
         ("regulator", "supply.rise_limit", 1.2e6, 0.02),
         ("dead band", "supply.dead_band", 3e4, 0.05),
         slow("one gauge", "supply.time_constant", 0.25, 0.03),
