@@ -83,7 +83,14 @@ def test_friction_of_the_text_comes_back_from_slipping_loops():
 
 @pytest.mark.parametrize(
     ("above", "verdict"),
-    [(10, "agree"), (9, "agree"), (8, "cannot tell"), (2, "cannot tell"), (1, "differs")],
+    [
+        (10, "agree"),
+        (9, "agree"),
+        (8, "cannot tell"),
+        (2, "cannot tell"),
+        (1, "differs"),
+        (0, "differs"),
+    ],
 )
 def test_nine_of_ten_stand_ins_decide(above, verdict, monkeypatch):
     line = {"group": "free", "fact": "f", "where": "2.3", "published": 1.0, "relation": "above"}
