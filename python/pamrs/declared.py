@@ -119,7 +119,7 @@ def told(
     origin : str
         Where the number comes from.
     """
-    given = locals()
+    given = dict(locals())  # first of all: every argument is a key, and nothing else
     relied_on = required and not optional and not omit_empty
     return given | {"enum": tuple(enum), "required": relied_on}
 

@@ -274,7 +274,7 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
     assert sorted(asked) == sorted(every)
 
 
-def test_what_is_far_behind_after_one_step_is_not_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_far_behind_after_one_step_is_not_followed() -> None:
     """Within ten times the least, or the best of one of the two best effects, is."""
     costs = {
         "muscle_creep": (1.0, 9.0, 11.0),
@@ -287,16 +287,20 @@ def test_what_is_far_behind_after_one_step_is_not_followed(monkeypatch: pytest.M
         for cost in own
     ]
 
-    def shortly(_: Attempts, starts: list[Start], *rest: Any) -> SimpleNamespace:
+    asked: list[tuple[str, int]] = []
+
+    def shortly(starts: list[Start], warm: Any, _: Any, evaluations: int) -> SimpleNamespace:
+        asked.append((warm if isinstance(warm, str) else "followed", evaluations))
         return SimpleNamespace(cost=starts[0].free["cost"], start=starts[0])
 
-    monkeypatch.setattr(Attempts, "_fit_shortly", shortly)
-    monkeypatch.setattr(Attempts, "start_of", lambda _, first, effect: first.start)
-    monkeypatch.setattr(Attempts, "_judged", lambda _, starts, found, wrong: found.cost)
-    tried = Attempts.fit_within_reach(Attempts(*6 * [None]), each, None, most=2)
+    trial = SimpleNamespace(
+        _fit_shortly=shortly,
+        start_of=lambda first, effect: first.start,
+        _judged=lambda starts, found, wrong: found.cost,
+    )
+    tried = Attempts.fit_within_reach(trial, each, "baseline", most=2)
     assert tried == [1.0, 9.0, None, 50.0, None, None]
-    tried = Attempts.fit_within_reach(Attempts(*6 * [None]), each, None, most=2, least=0.5)
-    assert tried == [1.0, None, None, 50.0, None, None]
+    assert asked == [("baseline", 2)] * 6 + [("followed", 4)] * 3
 
 
 @pytest.mark.parametrize(

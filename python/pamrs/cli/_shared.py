@@ -214,6 +214,8 @@ def document(schema: str, **content: Any) -> str:
     """A result as JSON, its schema first; what has ``to_dict`` is written as that says."""
 
     def plain(part: Any) -> Any:
+        if not hasattr(part, "to_dict"):
+            raise TypeError(f"{type(part).__name__} cannot be written as JSON")
         return part.to_dict()
 
     told = {"schema": schema, **content}

@@ -167,11 +167,14 @@ class PlanarArmModel(JointModel):
             raise ParameterError(f"rig {rig.name!r} has no [link]: it has an ArmModel")
         coupling, moment = _assembled(links)
         arm = next(iter(rig.tables("arm").values()))
-
-        def of_joints(key: str) -> Array:
-            return np.array([float(tables[name].get(key, 0.0)) for name in names])
-
-        stiffness = of_joints("stiffness")
+        least, most = (
+            np.array([float(tables[name][end]) for name in names])
+            for end in ("min_angle", "max_angle")
+        )
+        stiffness, at = (
+            np.array([float(tables[name].get(key, 0.0)) for name in names])
+            for key in ("stiffness", "spring_angle")
+        )
         return cls(
             names,
             coupling,
@@ -179,9 +182,9 @@ class PlanarArmModel(JointModel):
             np.array([float(link["viscous"]) for link in links]),
             JointTorques([joint_torque(rig, name, "full", active) for name in names]),
             highest_pressure(rig) if pressure_limit is None else pressure_limit,
-            (of_joints("min_angle"), of_joints("max_angle")),
+            (least, most),
             float(arm.get("base_angle", 0.0)),
-            (stiffness, of_joints("spring_angle")) if np.any(stiffness) else None,
+            (stiffness, at) if np.any(stiffness) else None,
         )
 
     def replace(self, **changes: Any) -> PlanarArmModel:

@@ -315,8 +315,8 @@ def _candidate(
     data: ForceMap, muscle: Muscle, settings: dict[str, Any], levels: Sequence[float] | None
 ) -> tuple[dict[str, Any], MuscleFit | None]:
     """One row of the table, and the fit of all levels where there is one."""
-    row = {name: settings[name] for name in ("model", "order")} | dict.fromkeys(_COLUMNS)
-    row |= {"nvarys": _unknowns(settings), "recommended": False}
+    row = {name: settings[name] for name in ("model", "order")}
+    row |= {"nvarys": _unknowns(settings), "recommended": False} | dict.fromkeys(_COLUMNS)
     try:
         fit = fit_muscle(data, muscle, **settings)
         cross = fit.leave_one_pressure_out()

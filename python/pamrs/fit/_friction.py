@@ -140,8 +140,12 @@ class FrictionFit(View):
     issues: list[str]
     isometric: bool = False
 
+    def _law(self) -> tuple[LawParameter, LawParameter]:
+        """Offset and slope of the law."""
+        return self.params["friction_coefficient"], self.params["friction_pressure_slope"]
+
     def __repr__(self) -> str:
-        c0, c1 = (item.value for item in self.params.values())
+        c0, c1 = (item.value for item in self._law())
         law = f"max({c0:.4g} {'-' if c1 < 0.0 else '+'} {1e6 * abs(c1):.4g}/MPa P, {self.floor:g})"
         return f"FrictionFit(c_F = {law}, {len(self.levels)} levels)"
 
@@ -151,7 +155,7 @@ class FrictionFit(View):
         return {"coefficient": partial(draw_law, fit=self)}
 
     def _numbers(self) -> dict[str, str]:
-        c0, c1 = self.params.values()
+        c0, c1 = self._law()
         return {
             "c0": f"{c0.value:.4g} ± {c0.stderr:.2g}",
             "c1": f"{1e6 * c1.value:.4g} ± {1e6 * c1.stderr:.2g} 1/MPa",
@@ -194,7 +198,7 @@ class FrictionFit(View):
         p = np.asarray(pressure, dtype=np.float64)
         if not np.all(np.isfinite(p)):
             raise ParameterError("pressure: a value is not finite")
-        c0, c1 = (item.value for item in self.params.values())
+        c0, c1 = (item.value for item in self._law())
         return np.maximum(c0 + c1 * p, self.floor)
 
     def mean_curve(self) -> tuple[Array, Array, Array]:
@@ -242,7 +246,7 @@ class FrictionFit(View):
 
     def fit_report(self) -> str:
         """The result in words and a table."""
-        c0, c1 = self.params.values()
+        c0, c1 = self._law()
         lines = [
             "friction of the muscle: F_total = F + d c_F |F|, c_F = max(c0 + c1 P, floor)",
             f"  c0 = {c0.value:.4g} +- {c0.stderr:.2g}",

@@ -415,6 +415,7 @@ def composed(
     RecordingError
         If more than a few values of a channel are not possible.
     """
+    grid = next(iter(laid.values())).grid
     channels: dict[str, Array] = {}
     masks: dict[str, Mask] = {}
     logged: dict[str, tuple[float, Array]] = {}
@@ -424,7 +425,6 @@ def composed(
         if own.grid.interpolates:
             logged[channel] = own.grid.usual, own.values
     issues.sort(key=lambda issue: (issue.start, issue.channel))
-    grid = own.grid
     step, units = grid.sample_time, dict(units)
     return Recording(name, role, grid.time, step, channels, masks, issues, units, logged=logged)
 

@@ -137,7 +137,8 @@ class Muscle:
         extension_slope: float = 6.105,
         neck_floor: float = 0.80,
     ) -> None:
-        given = {name: value for name, value in locals().items() if name != "self"}
+        given = dict(locals())  # first of all: every argument is a parameter, and nothing else
+        del given["self"]
         lists = {name: [float(v) for v in given[name]] for name in _LISTS}
         shape = own_geometry(model) if geometry is None else geometry
         self._model: dict[str, Any] = given | lists | {"geometry": shape}

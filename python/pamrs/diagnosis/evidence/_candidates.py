@@ -67,7 +67,8 @@ _SCATTER_STDS = 2.0
 _LEAST_STEP_SHARE = 0.2
 _EVALUATIONS_BESIDE = 6  # evaluations of the fit of persistent effects beside events that are held
 _FIRST_EVALUATIONS = 5  # evaluations of such a fit (decision 13)
-# times what the best leaves after the first steps from which a fit is not followed (decision 13)
+_ONE_STEP = 2  # evaluations of its first step: one at the start, one behind it
+# times what the best leaves after first steps from which a fit is not followed (decisions 13, 25)
 FAR_BEHIND = 10.0
 # evaluations of a freed parameter's first fit: is it worth a whole one (decision 25)
 _WRONG_PARAMETERS_FIRST_EVALUATIONS = 6
@@ -451,19 +452,24 @@ class Attempts:
         wrong: tuple[str, ...] = (),
         *,
         most: int,
-        least: float = math.inf,
     ) -> list[Candidate | None]:
-        """The same of many sets, in their order, that differ in their last effect; None also for
-        those that leave far more than the best after the first step, but for the best of each of so
-        many effects. ``least`` is the lowest cost of others that were fitted so.
+        """Many sets of effects, which differ in the last one, fitted in a few steps as
+        :meth:`fit_shortly` does; in their order, None where one cannot be run or is not followed.
+
+        After the first step those are followed that leave at most `FAR_BEHIND` times the least; and
+        the best start of each of the ``most`` effects that leave least.
         """
-        begun = two_at_a_time(lambda starts: self._fit_shortly(starts, warm, wrong, 2), each)
+
+        def one_step(starts: list[Start]) -> Fit | None:
+            return self._fit_shortly(starts, warm, wrong, _ONE_STEP)
+
+        begun = two_at_a_time(one_step, each)
         order = sorted((f.cost, k) for k, f in enumerate(begun) if f is not None)
         best: dict[Term, int] = {}
         for _, k in order:
             best.setdefault(each[k][-1].effect, k)
-        near = FAR_BEHIND * min([least, *(cost for cost, _ in order[:1])])
-        followed = {k for cost, k in order if cost <= near} | set(list(best.values())[:most])
+        followed = {k for cost, k in order if cost <= FAR_BEHIND * order[0][0]}
+        followed |= set(list(best.values())[:most])
 
         def ended(k: int) -> Candidate | None:
             first, starts = begun[k], each[k]

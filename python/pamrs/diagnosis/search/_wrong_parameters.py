@@ -212,6 +212,7 @@ def _fit_freed(
     worth = [names for names in short if not _needless(names, short, trial)]
     best = sorted(worth, key=lambda names: short[names].misfit)[:_MOST_FINISHED]
     if best:
+        # what is far behind after a few steps does not come nearer than the best on the way
         near = FAR_BEHIND * short[best[0]].misfit
         best = [names for names in best if short[names].misfit <= near]
     return {**short, **to_the_end(best)}
