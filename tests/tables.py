@@ -10,7 +10,9 @@ from typing import Any
 def rows_of(test: str, name: str) -> Any:
     """A table by its name, for a test whose file (``__file__``) is called as that of the tables."""
     with Path(test).with_suffix(".toml").open("rb") as file:
-        return tomllib.load(file)[name]
+        rows = tomllib.load(file)[name]
+    assert rows, f"{name} has no cases"
+    return rows
 
 
 def text_of(test: str, name: str) -> str:

@@ -57,13 +57,15 @@ def test_wrong_usage_is_one_line(capsys, words, part):
     assert_one_clean_line(err, part)
 
 
-def test_a_new_rig_file_can_be_read_as_it_stands(capsys, tmp_path):
+@pytest.mark.parametrize("like", pamrs.rigs.names())
+def test_a_new_rig_file_can_be_read_as_it_stands(capsys, tmp_path, like):
     file = tmp_path / "my arm.toml"
-    words = ("rig", "new", file, "--like", "antagonistic_joint", "--gas", "coefficients")
+    words = ("rig", "new", file, "--like", like, "--gas", "coefficients")
     assert run(capsys, *words)[0] == 0
-    rig, like = pamrs.load_rig(file), pamrs.rigs.antagonistic_joint()
+    assert run(capsys, "rig", "check", file)[0] == 0
+    rig, packaged = pamrs.load_rig(file), pamrs.rigs.named(like)
     assert rig.name == "my arm"
-    assert (rig.parameters, rig.wiring) == (like.parameters, like.wiring)
+    assert (rig.parameters, rig.wiring) == (packaged.parameters, packaged.wiring)
     text = file.read_text(encoding="utf-8")
     for word in ("friction", "elbow_linear", "polynomial", "leak_muscle", "from 0 to"):
         assert word in text

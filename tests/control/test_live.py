@@ -39,12 +39,14 @@ def rig():
     return pamrs.rigs.shoulder()
 
 
-def live(rig, controller=None, clock=None, device=None, kind=SimulatedDevice, **options):
+def live(
+    rig, controller=None, clock=None, device=None, kind=SimulatedDevice, trajectory=LIFT, **options
+):
     """A live loop of a device of a kind, and the device; what it raises has it as ``device``."""
     clock, controller = clock or VirtualClock(), controller or SmallPid(period=0.01)
     made = kind(rig, clock, **(device or {}))
     try:
-        return run_live(made, controller, LIFT, clock=clock, **options), made
+        return run_live(made, controller, trajectory, clock=clock, **options), made
     except BaseException as error:
         error.device = made
         raise
@@ -424,10 +426,8 @@ VALVES = ["valve_command.flexor", "valve_command.extensor"]
 
 def rig_live(model, trajectory=TURN, device=None, made=RigController, kind=SimulatedDevice, **more):
     """A live loop of a controller of every command, which is made with the sliding law."""
-    clock = VirtualClock()
-    whole = kind(model.rig, clock, **(device or {}))
     controller = made(model, model.law("sliding", period=0.01))
-    return run_live(whole, controller, trajectory, clock=clock, **more), whole
+    return live(model.rig, controller, device=device, kind=kind, trajectory=trajectory, **more)
 
 
 @pytest.mark.parametrize(
@@ -473,15 +473,21 @@ def test_every_valve_gets_its_safe_command(safe, expected):
     assert np.ptp(extensor) > 0.1
 
 
-def test_every_valve_gets_its_safe_command_at_ctrl_c():
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), ZeroDivisionError("oh")])
+def test_every_valve_gets_its_safe_command_at_ctrl_c_and_after_an_error(error):
     class Stopped(RigController):
         def update(self, time, measurement, reference):
             if time >= 1.0:
-                raise KeyboardInterrupt
+                raise error
             return super().update(time, measurement, reference)
 
-    run, device = rig_live(PAIR, made=Stopped)
-    assert run.reason == "interrupted"
+    if isinstance(error, KeyboardInterrupt):
+        run, device = rig_live(PAIR, made=Stopped)
+        assert run.reason == "interrupted"
+    else:
+        with pytest.raises(LiveError, match="oh") as caught:
+            rig_live(PAIR, made=Stopped)
+        device = caught.value.device
     assert device.written[-1] == (pytest.approx(1.0), dict.fromkeys(VALVES, 5.0))
 
 

@@ -74,6 +74,16 @@ def test_the_channels_decide_what_can_be_told_apart(
 
 
 @pytest.mark.slow
+def test_a_nominal_antagonist_has_nothing_missing(rig: pamrs.Rig) -> None:
+    found = diagnosed(rig, partial(antagonists, rig, rows=1000))
+    assert found.verdict in ("none", "parameters")
+    groups = [["supply", "chamber.flexor", "chamber.extensor"], ["arm.elbow"]]
+    assert [group["blocks"] for group in found.blocks] == groups
+    assert set(found.residuals) == {block for group in groups for block in group}
+    assert "chamber.flexor.dead_volume" in found.parameters
+
+
+@pytest.mark.slow
 def test_pressures_alone_tell_the_friction_of_the_muscles(rig: pamrs.Rig, bare: pamrs.Rig) -> None:
     assert diagnosed(bare, partial(pressures_only, rig)).verdict in ("none", "parameters")
     found = diagnosed(bare, partial(pressures_only, rig.with_effect("muscle_hysteresis")))

@@ -92,13 +92,15 @@ FORMS = [(effect, form) for effect in sorted(EFFECTS) for form in EFFECTS[effect
 def test_a_form_survives_its_file_and_off_it_changes_nothing(effect: str, form: Form) -> None:
     plain, first = rig_for(effect), form.parameters[0]
     known = {first.name: 0.1 * first.upper}
-    rig = plain.with_effect(effect, std=known, form=form.name)
+    rig = plain.with_effect(effect, {first.name: first.upper}, std=known, form=form.name)
+    assert rig.effects[0]["parameters"][first.name] == first.upper
     again = parse_rig(rig.to_toml_text())
     assert (again.effects, again.effect_std) == (rig.effects, {effect: pytest.approx(known)})
     assert json.loads(rig.to_json())["effects"] == [{**rig.effects[0], "at": ""}]
     assert rig.without_effect(effect).effects == []
-    there = run(rig)
-    equal(there, run(again))
+    usual = plain.with_effect(effect, form=form.name)
+    there = run(usual)
+    equal(there, run(parse_rig(usual.to_toml_text())))
     assert all(np.isfinite(there[channel]).all() for channel in there)
     neutral = {p.name: p.neutral for p in form.parameters if p.neutral is not None}
     assert bool(neutral) == (effect != "heat_transfer")  # the only one without

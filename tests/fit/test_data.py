@@ -525,7 +525,7 @@ NO_QUESTION = {
     "stiff": lifting(7e4, stiffness=5e3, lengths=(0.299, 0.28, 0.26)),
     "no long length": lifting(0.0, stiffness=1e4, lengths=(0.28, 0.26)),
     "three levels": [column[:12] for column in lifting(0.0, 101.3e3)],
-    "pressure below ambient": map(np.append, lifting(1e5), (0.30, 5e4, 1.0)),
+    "pressure below ambient": tuple(map(np.append, lifting(1e5), (0.30, 5e4, 1.0))),
 }
 
 

@@ -97,6 +97,7 @@ def trajectory_misses(path: Path) -> dict[str, float]:
     time, command, *columns = np.genfromtxt(path, delimiter=",", skip_header=1).T
     offsets = {"muscle_pressure": AMBIENT, "supply_pressure": AMBIENT}
     names = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
+    assert len(columns) >= len(names)
     want = {n: own - offsets.get(n, 0.0) for n, own in zip(names, columns, strict=False)}
     initial = {name: values[0] for name, values in want.items()}
     run = Run("shoulder", SAMPLE_TIME, time.size, initial, {"valve_command": command})

@@ -13,6 +13,7 @@ def refused(
     *cases: tuple[str, Callable[[], object]], by: type[PamrsError] = ParameterError
 ) -> None:
     """Each call is refused in words that match the pattern before it."""
+    assert cases
     for told, call in cases:
         with pytest.raises(by, match=told):
             call()
