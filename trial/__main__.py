@@ -12,7 +12,6 @@ from pathlib import Path
 
 from .concealed import make_case, write
 from .design import PLANS, ROUND, SECOND, specs
-from .diagram import reliability_diagram
 from .effects import KINDS
 from .inserted import all_inserted
 from .inserted import table as insertion_table
@@ -125,6 +124,8 @@ def _pool(args: argparse.Namespace) -> None:
             raise ValueError(f"--cases {args.cases}: the name must end in {CASES}")
         args.cases.write_bytes(table_of_cases(trials))
     if args.diagram is not None:
+        from .diagram import reliability_diagram  # matplotlib, which no other command needs
+
         reliability_diagram([mark for marks in trials.values() for mark in marks], args.diagram)
     _shown(pooled_page(trials), args.markdown)
 

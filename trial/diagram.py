@@ -46,7 +46,7 @@ def reliability_diagram(marks: Sequence[Mark], file: Path) -> None:
     for b, x, y in zip(bins, stated, right, strict=True):
         axes.annotate(f"{b['n']:.0f}", (x, y), (6, -11), textcoords="offset points", color=_INK)
     axes.set(xlabel="stated probability of the leading answer", ylabel="share that is right")
-    axes.set(xlim=(0.3, 1.03), ylim=(0.0, 1.03))
+    axes.set(xlim=(min(0.3, min(stated) - 0.03), 1.03), ylim=(0.0, 1.03))
     axes.set_title(f"{100.0 * off:.1f} points off in the mean", fontsize=10)
     axes.legend(loc="lower right", frameon=False)
     axes.grid(alpha=0.3)
