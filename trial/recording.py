@@ -251,7 +251,7 @@ def follow(
     bare: Any,
     record: Record,
     index: int = 0,
-    shift: tuple[float, ...] = (0.0, 0.0),
+    shift: tuple[float, ...] | None = None,
     window: float = 2.0,
     sample_time: float = SAMPLE_TIME,
     way: Callable[[Any, float], Any] = CommandPath,
@@ -270,8 +270,8 @@ def follow(
         With the true states.
     index : int
         Number of the recording in the case.
-    shift : tuple of float
-        Added to each pressure [Pa] and to the angle [rad] at the starts.
+    shift : tuple of float, optional
+        Added to each pressure [Pa] and to the angle [rad] at the starts; by default nothing.
     window : float
         Length of a window [s].
     sample_time : float
@@ -283,13 +283,14 @@ def follow(
     parts = max(1, math.ceil(sample_time / 6.0e-3))
     found: list[tuple[float, ...]] = []
     path = way(bare, sample_time)
+    none = (0.0,) * len(path.kinds)
     begin = RECORDING_PERIOD * index
     opening = path.shut
     y: State = []
     for i, (state, command) in enumerate(zip(record.states, record.command.tolist(), strict=True)):
         clock = begin + i * sample_time
         if i % every == 0:
-            y = path.begun(state, shift, y or state, clock)
+            y = path.begun(state, shift or none, y or state, clock)
         y = bare.tick(y)
         found.append(bare.reading(y, opening))
         for opening, span in path.spans(command, clock):
