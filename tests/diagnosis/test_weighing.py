@@ -275,7 +275,7 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
 
 
 def test_what_is_far_behind_after_one_step_is_not_followed() -> None:
-    """Within ten times the least, or the best of one of the two best effects, is."""
+    """Within ten times the least, or of one of the two best effects, is."""
     costs = {
         "muscle_creep": (1.0, 9.0, 11.0),
         "payload_swing": (50.0, 60.0),
@@ -299,8 +299,10 @@ def test_what_is_far_behind_after_one_step_is_not_followed() -> None:
         _judged=lambda starts, found, wrong: found.cost,
     )
     tried = Attempts.fit_within_reach(trial, each, "baseline", most=2)
-    assert tried == [1.0, 9.0, None, 50.0, None, None]
-    assert asked == [("baseline", 2)] * 6 + [("followed", 4)] * 3
+    assert tried == [1.0, 9.0, 11.0, 50.0, 60.0, None]
+    assert asked == [("baseline", 2)] * 6 + [("followed", 4)] * 5
+    assert Attempts.fit_within_reach(trial, each, "baseline", most=0) == [1.0, 9.0] + 4 * [None]
+    assert Attempts.fit_within_reach(trial, [], "baseline", most=2) == []
 
 
 @pytest.mark.parametrize(

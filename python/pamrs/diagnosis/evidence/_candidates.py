@@ -457,19 +457,18 @@ class Attempts:
         :meth:`fit_shortly` does; in their order, None where one cannot be run or is not followed.
 
         After the first step those are followed that leave at most `FAR_BEHIND` times the least; and
-        the best start of each of the ``most`` effects that leave least.
+        all of the ``most`` effects that leave least.
         """
 
         def one_step(starts: list[Start]) -> Fit | None:
             return self._fit_shortly(starts, warm, wrong, _ONE_STEP)
 
         begun = two_at_a_time(one_step, each)
-        order = sorted((f.cost, k) for k, f in enumerate(begun) if f is not None)
-        best: dict[Term, int] = {}
-        for _, k in order:
-            best.setdefault(each[k][-1].effect, k)
-        followed = {k for cost, k in order if cost <= FAR_BEHIND * order[0][0]}
-        followed |= set(list(best.values())[:most])
+        costs = {k: f.cost for k, f in enumerate(begun) if f is not None}
+        order = sorted(costs, key=lambda k: costs[k])
+        best = list(dict.fromkeys(each[k][-1].effect for k in order))[:most]
+        near = FAR_BEHIND * min(costs.values(), default=0.0)
+        followed = [k for k in order if costs[k] <= near or each[k][-1].effect in best]
 
         def ended(k: int) -> Candidate | None:
             first, starts = begun[k], each[k]
