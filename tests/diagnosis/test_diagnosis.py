@@ -110,7 +110,7 @@ def test_a_missing_channel_is_named() -> None:
         pamrs.diagnose(case.with_rig(RIG))
 
 
-def test_a_third_of_the_samples_missing_leaves_the_answer() -> None:
+def test_a_third_of_the_samples_missing_changes_nothing() -> None:
     case = held(3e-11, 120.0)
     (recording,) = case.recordings
     holes = np.random.default_rng(3).random(len(recording)) < 0.3
@@ -118,9 +118,7 @@ def test_a_third_of_the_samples_missing_leaves_the_answer() -> None:
     recording.channels["muscle_pressure"][holes] = np.nan
     found = pamrs.diagnose(case)
     assert found.effects[0]["id"] == "leak_muscle"
-    leak = found.effects[0]["parameters"]["conductance"]
-    assert leak["value"] == pytest.approx(3e-11, abs=leak["std"])
-    assert leak["std"] < 3e-12
+    assert found.effects[0]["parameters"]["conductance"]["value"] == pytest.approx(3e-11, rel=0.03)
 
 
 def shoulder_recording(n: int = 2000) -> Recording:

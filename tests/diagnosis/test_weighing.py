@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -255,7 +254,7 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
 
     trial = SimpleNamespace(
         settings=SETTINGS,
-        fit_within_reach=lambda each, fit, **_: [shortly(starts, fit) for starts in each],
+        fit_shortly=shortly,
         start_of=lambda fit, effect: Start(effect, {}, {}, (), False),
     )
     search = SimpleNamespace(
@@ -272,37 +271,6 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
     assert [term.id for term in found] == ["muscle_rate_damping"]
     every = [*((effect, 1.0) for effect in keys), ("muscle_rate_damping", 2.0)]
     assert sorted(asked) == sorted(every)
-
-
-def test_what_is_far_behind_after_one_step_is_not_followed() -> None:
-    """Within ten times the least, or of one of the two best effects, is."""
-    costs = {
-        "muscle_creep": (1.0, 9.0, 11.0),
-        "payload_swing": (50.0, 60.0),
-        "heat_transfer": (70.0,),
-    }
-    each = [
-        [Start(Term(effect), {"cost": cost}, {}, (), False)]
-        for effect, own in costs.items()
-        for cost in own
-    ]
-
-    asked: list[tuple[str, int]] = []
-
-    def shortly(starts: list[Start], warm: Any, _: Any, evaluations: int) -> SimpleNamespace:
-        asked.append((warm if isinstance(warm, str) else "followed", evaluations))
-        return SimpleNamespace(cost=starts[0].free["cost"], start=starts[0])
-
-    trial = SimpleNamespace(
-        _fit_shortly=shortly,
-        start_of=lambda first, effect: first.start,
-        _judged=lambda starts, found, wrong: found.cost,
-    )
-    tried = Attempts.fit_within_reach(trial, each, "baseline", most=2)
-    assert tried == [1.0, 9.0, 11.0, 50.0, 60.0, None]
-    assert asked == [("baseline", 2)] * 6 + [("followed", 4)] * 5
-    assert Attempts.fit_within_reach(trial, each, "baseline", most=0) == [1.0, 9.0] + 4 * [None]
-    assert Attempts.fit_within_reach(trial, [], "baseline", most=2) == []
 
 
 @pytest.mark.parametrize(

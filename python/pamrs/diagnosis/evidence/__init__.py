@@ -12,7 +12,6 @@ Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_
 from __future__ import annotations
 
 from pamrs.diagnosis.evidence._candidates import (
-    FAR_BEHIND,
     Attempts,
     BlockGroup,
     Candidate,
@@ -52,7 +51,6 @@ from pamrs.diagnosis.evidence._weighing import (
 )
 
 __all__ = [
-    "FAR_BEHIND",
     "WALL_TOLERANCES",
     "FORM_SHARE_ALIKE",
     "Attempts",

@@ -5,7 +5,7 @@ recordings.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from typing import TypeVar
@@ -34,7 +34,6 @@ from pamrs.diagnosis.fit import (
     places_of,
     predicted_with_doubt,
     residuals,
-    two_at_a_time,
     with_effects_of,
     without_term,
 )
@@ -67,9 +66,6 @@ _SCATTER_STDS = 2.0
 _LEAST_STEP_SHARE = 0.2
 _EVALUATIONS_BESIDE = 6  # evaluations of the fit of persistent effects beside events that are held
 _FIRST_EVALUATIONS = 5  # evaluations of such a fit (decision 13)
-_ONE_STEP = 2  # evaluations of its first step: one at the start, one behind it
-# times what the best leaves after first steps from which a fit is not followed (decisions 13, 25)
-FAR_BEHIND = 10.0
 # evaluations of a freed parameter's first fit: is it worth a whole one (decision 25)
 _WRONG_PARAMETERS_FIRST_EVALUATIONS = 6
 
@@ -442,60 +438,15 @@ class Attempts:
         """A set of effects fitted in a few steps, beside other values of some parameters: enough to
         see which of many are worth a whole fit; None where it cannot be run.
         """
-        found = self._fit_shortly(starts, warm, wrong, _FIRST_EVALUATIONS)
-        return None if found is None else self._judged(starts, found, wrong)
-
-    def fit_within_reach(
-        self,
-        each: Sequence[list[Start]],
-        warm: Fit,
-        wrong: tuple[str, ...] = (),
-        *,
-        most: int,
-    ) -> list[Candidate | None]:
-        """Many sets of effects, which differ in the last one, fitted in a few steps as
-        :meth:`fit_shortly` does; in their order, None where one cannot be run or is not followed.
-
-        After the first step those are followed that leave at most `FAR_BEHIND` times the least; and
-        all of the ``most`` effects that leave least.
-        """
-
-        def one_step(starts: list[Start]) -> Fit | None:
-            return self._fit_shortly(starts, warm, wrong, _ONE_STEP)
-
-        begun = two_at_a_time(one_step, each)
-        costs = {k: f.cost for k, f in enumerate(begun) if f is not None}
-        order = sorted(costs, key=lambda k: costs[k])
-        best = list(dict.fromkeys(each[k][-1].effect for k in order))[:most]
-        near = FAR_BEHIND * min(costs.values(), default=0.0)
-        followed = [k for k in order if costs[k] <= near or each[k][-1].effect in best]
-
-        def ended(k: int) -> Candidate | None:
-            first, starts = begun[k], each[k]
-            if first is None or k not in followed:
-                return None
-            on = [self.start_of(first, start.effect) for start in starts]
-            found = self._fit_shortly(on, first, wrong, _FIRST_EVALUATIONS - 1)
-            return None if found is None else self._judged(starts, found, wrong)
-
-        return two_at_a_time(ended, range(len(each)))
-
-    def _fit_shortly(
-        self, starts: list[Start], warm: Fit, wrong: tuple[str, ...], evaluations: int
-    ) -> Fit | None:
-        """A set of effects fitted in so many steps."""
-        effects = [start.effect for start in starts]
+        effects = tuple(start.effect for start in starts)
         if not self.held.isdisjoint(e.id for e in effects):
             return None
-        work = partial(self._fit, starts, self.white, warm, wrong=wrong, evaluations=evaluations)
-        return self._attempt((*effects, *wrong), work)
 
-    def _judged(self, starts: list[Start], found: Fit, wrong: tuple[str, ...]) -> Candidate | None:
-        """A set of effects that was fitted beside other values of some parameters, judged."""
-        effects = tuple(start.effect for start in starts)
-        return self._attempt(
-            (*effects, *wrong), lambda: replace(self.judge(effects, found), wrong=wrong)
-        )
+        def found() -> Candidate:
+            short = self._fit(starts, self.white, warm, wrong=wrong, evaluations=_FIRST_EVALUATIONS)
+            return replace(self.judge(effects, short), wrong=wrong)
+
+        return self._attempt((*effects, *wrong), found)
 
     def _attempt(self, terms: Iterable[object], work: Callable[[], Found]) -> Found | None:
         """What an attempt at a hypothesis gives; None where it leaves the range in which the model

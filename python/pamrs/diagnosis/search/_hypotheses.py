@@ -897,9 +897,9 @@ def _shortlist(
     the best of these steps led, and what they came to, by effect and form.
 
     Signatures rank places and starts and rule no effect out: they are linear in what a strong
-    effect is not. Each form of each effect gets a step from its best start at its best place, and a
-    few more where that is within reach of the best; effects that came to nothing in every form are
-    left, and those that then lead get the same from all their other starts.
+    effect is not. Each form of each effect gets a few steps from its best start at its best place;
+    effects that came to nothing in every form are left, and those that then lead get a few steps
+    from all their other starts.
     """
     trial, weight, baseline = search.trial, search.weight, search.start.fit
     settings = trial.settings
@@ -907,8 +907,7 @@ def _shortlist(
 
     def begin(starts: dict[Term, list[Start]]) -> None:
         tasks = [(e, start) for e, own in starts.items() for start in own]
-        each = [[start] for _, start in tasks]
-        tried = trial.fit_within_reach(each, baseline, most=settings.most_singles)
+        tried = two_at_a_time(lambda one: trial.fit_shortly([one[1]], baseline), tasks)
         for effect in starts:
             own = [c for (e, _), c in zip(tasks, tried, strict=True) if e == effect]
             known = [*short.get(effect, []), *(c for c in own if c is not None)]
@@ -920,11 +919,7 @@ def _shortlist(
     best_of = {places[0]: best_of_each_kind(ranked[places[0]]) for places in worth}
     begin({effect: _scaled_starts(best) for effect, best in best_of.items()})
     walls = settings.most_tolerances
-    absent = {
-        e
-        for e, own in short.items()
-        if len(own) == len(best_of[e]) and all(is_absent(c, walls) for c in own)
-    }
+    absent = {e for e, own in short.items() if own and all(is_absent(c, walls) for c in own)}
     there = [places for places in worth if places[0] not in absent]
     first = sorted(there, key=lambda places: -most(places[0]))[: settings.most_singles]
     begin(

@@ -299,9 +299,12 @@ class _Growing:
         """A set with an effect more, fitted in a few steps from each of its starts, with the start;
         what weighs most comes first.
         """
-        each = [[*begun, start] for start in starts]
-        tried = self.trial.fit_within_reach(each, base.fit, base.wrong, most=_MOST_PARTNERS)
-        found = [(c, start) for c, start in zip(tried, starts, strict=True) if c is not None]
+
+        def begin(start: Start) -> Candidate | None:
+            return self.trial.fit_shortly([*begun, start], base.fit, base.wrong)
+
+        tried = zip(two_at_a_time(begin, starts), starts, strict=True)
+        found = [(c, start) for c, start in tried if c is not None]
         return sorted(found, key=lambda one: self.search.weight(one[0]), reverse=True)
 
     def _begun_best(self, base: Candidate, begun: list[Start], scores: list[Score]) -> _Partner:

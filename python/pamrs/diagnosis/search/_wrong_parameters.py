@@ -16,14 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import (
-    FAR_BEHIND,
-    WALL_TOLERANCES,
-    Attempts,
-    BlockGroup,
-    Candidate,
-    significant,
-)
+from pamrs.diagnosis.evidence import WALL_TOLERANCES, Attempts, BlockGroup, Candidate, significant
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -46,6 +39,8 @@ FURTHER_SHARE = 0.2
 _LEAST_PREDICTED_GAIN = 9.2
 # freed parameters, and pairs of them, that are fitted to their end (decision 25)
 _MOST_FINISHED = 3
+# times the misfit of a freed parameter that leaves noise, for others fitted beside it
+_NEAR_MISFIT = 2.0
 # [tolerances] moved by a suspect beside effects, which take a part of what it would do
 _FAR_TOLERANCES = 2.0
 _MOST_BESIDE = 2  # parameters at their wall that are freed beside the effects that leave least
@@ -211,9 +206,9 @@ def _fit_freed(
     short = {names: c for names, c in begun if c is not None}
     worth = [names for names in short if not _needless(names, short, trial)]
     best = sorted(worth, key=lambda names: short[names].misfit)[:_MOST_FINISHED]
-    if best:
-        # what is far behind after a few steps does not come nearer than the best on the way
-        near = FAR_BEHIND * short[best[0]].misfit
+    if best and not any(significant(e) for e in short[best[0]].fitted.values()):
+        # what leaves much more than one that leaves noise does not get there
+        near = _NEAR_MISFIT * short[best[0]].misfit
         best = [names for names in best if short[names].misfit <= near]
     return {**short, **to_the_end(best)}
 
