@@ -1,7 +1,7 @@
 """Which effects are worth a fit: scores, and one recording left out after the other.
 
 Public: `Score`, `Screen`, `Tangent`, `screen`, `tangent_of`, `by_effect`, `best_of_each_kind`,
-`best_size`, `predicted_by_others`.
+`predicted_by_others`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from pamrs.diagnosis.screen._screening import (
     Screen,
     Tangent,
     best_of_each_kind,
-    best_size,
     by_effect,
     screen,
     tangent_of,
@@ -25,7 +24,6 @@ __all__ = [
     "Screen",
     "Tangent",
     "best_of_each_kind",
-    "best_size",
     "by_effect",
     "predicted_by_others",
     "screen",

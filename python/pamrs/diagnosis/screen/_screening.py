@@ -97,21 +97,13 @@ class Tangent:
     left : (n,) array
         What of them the free parameters leave, the pull of their priors included: where an effect
         would let a parameter go back to its nominal value, that counts for the effect.
-    jacobian : (n, k) array
-        Change of the rows with each free parameter that is not at the end of its range, in
-        tolerances or its own scale.
-    moved, free : (k,) array
-        How far each is from its nominal value, and 1 where a prior holds it, 0 where none does.
     basis : (n, k) array
-        Basis of what the free parameters can do, each column as long as the priors let it: its
-        product with its transpose projects.
+        Basis of what the free parameters that are not at the end of their range can do, each column
+        as long as the priors let it: its product with its transpose projects.
     """
 
     rows: Array
     left: Array
-    jacobian: Array
-    moved: Array
-    free: Array
     basis: Array
 
     @property
@@ -163,12 +155,12 @@ class Screen:
             power = own.power(signature)
             if power < _INVISIBLE:
                 continue
-            size, gain = best_size(float(own.left @ signature), power, start)
+            size, gain = _best_size(float(own.left @ signature), power, start)
             found.append(Score(effect, start, gain, size, signature))
         return sorted(found, key=lambda s: -s.gain)
 
 
-def best_size(along: float, power: float, start: Start) -> tuple[float, float]:
+def _best_size(along: float, power: float, start: Start) -> tuple[float, float]:
     """Multiple of a start's size at which its signature gains most, inside its plausible range, and
     that gain in chi-square.
 
@@ -209,8 +201,7 @@ def tangent_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Ta
     walls = problem.settings.most_tolerances
     names = [n for n in fitted.values if abs(fitted.held_by_prior.get(n, 0.0)) < walls - 1e-3]
     if jacobian is None or not names:
-        none = np.zeros((rows.size, 0))
-        return Tangent(rows, rows, none, np.zeros(0), np.zeros(0), none)
+        return Tangent(rows, rows, np.zeros((rows.size, 0)))
     scales = np.array([fitted.scales[name] for name in names])
     scaled = jacobian[:, [list(fitted.values).index(name) for name in names]] * scales
     free = np.array([name in fitted.held_by_prior for name in names], dtype=np.float64)
@@ -226,7 +217,7 @@ def tangent_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Ta
     basis = (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
     moved = np.array([fitted.held_by_prior.get(name, 0.0) for name in names])
     pull = u @ (inner @ solve_normal(normal, moved))
-    return Tangent(rows, rows - basis @ (basis.T @ rows) - pull, scaled, moved, free, basis)
+    return Tangent(rows, rows - basis @ (basis.T @ rows) - pull, basis)
 
 
 def screen(
