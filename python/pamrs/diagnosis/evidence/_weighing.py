@@ -187,8 +187,8 @@ def _rarity(candidate: Candidate, weighing: Weighing) -> float:
 
 
 def _strain(candidate: Candidate) -> float:
-    """What a hypothesis loses by how far parameters moved."""
-    return 0.5 * _STRAIN_SHARE * candidate.fit.strain
+    """What a hypothesis loses by how far parameters moved, and how warm gases began."""
+    return 0.5 * _STRAIN_SHARE * (candidate.fit.strain + candidate.fit.start_strain)
 
 
 def _evidence(
@@ -318,11 +318,14 @@ def may_be_inside(candidate: Candidate, walls: float, stds: float) -> bool:
     """Whether a value that is called wrong may be inside its tolerances, so many standard
     deviations off.
     """
-    found = candidate.fit
-    return any(
-        abs(found.moved[name]) - walls < stds * found.std.get(name, 0.0) / found.scales[name]
-        for name in candidate.wrong
-    )
+    return any(value_may_be_inside(candidate.fit, name, walls, stds) for name in candidate.wrong)
+
+
+def value_may_be_inside(found: Fit, name: str, walls: float, stds: float) -> bool:
+    """Whether a fit has a value inside its tolerances (so many of them), or so many of its standard
+    deviations outside.
+    """
+    return abs(found.moved[name]) - walls < stds * found.std.get(name, 0.0) / found.scales[name]
 
 
 def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
