@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison
 from pamrs.design import (
     LENGTHS,
     JointDesign,
@@ -23,6 +22,7 @@ from pamrs.design import (
 )
 from pamrs.library import entry
 from pamrs.units import to_si
+from reproduction.comparison import Comparison
 from reproduction.statements import Lines, Statements
 
 _FOOT_POUND: Final = to_si(1.0, "ft lbf", "torque")
@@ -237,7 +237,7 @@ def _angle_needed(case: PublishedCase, problem: JointProblem, torque: float) -> 
     """The braid angle with which the rest torque is the wanted one, in words; empty where it is
     there already.
     """
-    from pamrs.library.evaluate import root_between
+    from reproduction.muscles.evaluate import root_between
 
     if torque >= case.torque:
         return ""

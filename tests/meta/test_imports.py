@@ -20,7 +20,6 @@ LAYERS = (
     ("units", "channels"),
     ("declared", "_checks"),
     (
-        "comparison",
         "findings",
         "_arrays",
         "_files",

@@ -1,5 +1,5 @@
-"""The command line: ``pamrs diagnose``, ``effects``, ``fit``, ``import``, ``library``, ``lift``,
-``simulate``, ``size``, ``rig``, ...
+"""The command line: ``pamrs diagnose``, ``effects``, ``fit``, ``import``, ``simulate``,
+``size``, ``rig``, ...
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
 command did its work (a diagnosis that finds nothing missing included), 1 when it was interrupted, 2
@@ -27,8 +27,6 @@ from pamrs.cli.effects import effects_command
 from pamrs.cli.example import example_command
 from pamrs.cli.fit import fit_app
 from pamrs.cli.import_logs import import_command
-from pamrs.cli.library import library_command
-from pamrs.cli.lift import lift_command
 from pamrs.cli.replay import replay_command
 from pamrs.cli.rig import rig_app
 from pamrs.cli.schema import schema_command
@@ -67,8 +65,6 @@ app.command("simulate")(simulate_command)
 app.command("effects")(effects_command)
 app.command("example")(example_command)
 app.command("import")(import_command)
-app.command("library")(library_command)
-app.command("lift")(lift_command)
 app.command("replay")(replay_command)
 app.command("schema")(schema_command)
 app.command("size")(size_command)

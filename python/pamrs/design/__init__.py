@@ -26,7 +26,6 @@ from pamrs.design._joint_design import (
     compare_methods,
     optimise,
 )
-from pamrs.design._lifting import Lift, lift
 from pamrs.design._pressure import (
     ParetoFront,
     PressureSearch,
@@ -50,7 +49,6 @@ __all__ = [
     "History",
     "JointDesign",
     "JointProblem",
-    "Lift",
     "MethodComparison",
     "MissingPackageError",
     "ParetoFront",
@@ -60,7 +58,6 @@ __all__ = [
     "Trial",
     "compare_methods",
     "least_pressure",
-    "lift",
     "minimum_pressure",
     "optimise",
     "pareto_front",
