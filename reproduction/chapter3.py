@@ -68,18 +68,13 @@ def facts(*, search: bool = True, progress: Progress | None = None) -> list[Comp
     Parameters
     ----------
     search : bool
-        Whether the joint searches of 3.5 run too: about a minute, extra ``search``.
+        Whether the joint searches of 3.5 run too: about a minute.
     progress : callable, optional
         Called with what is done next.
 
     Returns
     -------
     list of Comparison
-
-    Raises
-    ------
-    MissingPackageError
-        If a search library is missing; names the extra to install.
     """
     tell = progress or (lambda _: None)
     parts = {
