@@ -107,7 +107,7 @@ class PressureSearch:
 
     @property
     def met(self) -> bool:
-        """Whether any pressure was enough."""
+        """True where some pressure was enough."""
         return any(trial.met for trial in self.trials)
 
     @property

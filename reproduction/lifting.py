@@ -1,5 +1,5 @@
-"""What an arm can lift and hold: the torque of its muscles at a pressure against that of gravity,
-over the joint's range.
+"""Payloads that an arm lifts and holds: the torque of its muscles at a pressure against that of
+gravity, over the joint's range.
 
 Statics only: pressure is taken as reached slowly, so that nothing is carried on by its swing.
 Coulomb friction of the arm and hysteresis of the muscles are losses while lifting and help while
@@ -31,7 +31,7 @@ _LIFTING, _HOLDING = -1.0, 1.0  # direction of the muscles: shortening, about to
 
 @dataclass(frozen=True, eq=False)
 class Lift:
-    """What :func:`lift` found; SI units, angles from the vertical.
+    """Result of :func:`lift`; SI units, angles from the vertical.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Lift:
 def lift(
     rig: Rig, *, pressure: float | None = None, to: float | None = None, points: int = 721
 ) -> Lift:
-    """What a one-link rig lifts and holds at a pressure.
+    """Find what a one-link rig lifts and holds at a pressure.
 
     At each angle the torque of the muscles ``n F(P, d(theta)/L0) dd/dtheta`` is compared
     with gravity's ``(m lc + mp l) g sin(theta)`` (sections 4 and 5 of the physics reference;
@@ -228,14 +228,14 @@ class _Balance:
         return np.asarray(self.arm["length"] * self.arm["gravity"] * np.sin(direction))
 
     def own(self, angle: Array) -> Array:
-        """What holds the empty arm against gravity and a spring across the joint [N m]."""
+        """Torque that holds the empty arm against gravity and a spring across the joint [N m]."""
         direction = angle + self.arm.get("base_angle", 0.0) + self.arm.get("centre_angle", 0.0)
         weight = self.arm["first_moment"] * self.arm["gravity"] * np.sin(direction)
         spring = self.joint.get("stiffness", 0.0) * (angle - self.joint.get("spring_angle", 0.0))
         return np.asarray(weight + spring)
 
     def gravity(self, angle: Array) -> Array:
-        """What holds the arm with its payload [N m]."""
+        """Torque that holds the arm with its payload [N m]."""
         return np.asarray(self.own(angle) + self.arm["payload"] * self.weight(angle))
 
     def excess(self, angle: Array) -> Array:
@@ -247,7 +247,7 @@ class _Balance:
         return self.torque(angle, _HOLDING) + self.coulomb - self.gravity(angle)
 
     def free(self, angle: Array) -> Array:
-        """What lifts a payload: muscles less friction less the empty arm [N m]."""
+        """Torque left for a payload: muscles less friction less the empty arm [N m]."""
         return self.torque(angle, _LIFTING) - self.coulomb - self.own(angle)
 
     def capacity(self, angle: Array) -> Array:
@@ -288,7 +288,7 @@ def _of_one(function: Callable[[Array], Array]) -> Callable[[float], float]:
 
 
 def _crossings(function: Callable[[Array], Array], angle: Array) -> list[float]:
-    """Where a function changes sign between the first and the last angle."""
+    """Angles at which a function changes sign."""
     from scipy.optimize import brentq
 
     positive, found = function(angle) > 0.0, []
@@ -299,7 +299,7 @@ def _crossings(function: Callable[[Array], Array], angle: Array) -> list[float]:
 
 
 def _least(function: Callable[[Array], Array], angle: Array) -> float:
-    """Where a function is least over the angles, refined between its neighbours."""
+    """Angle at which a function is least, refined between its neighbours."""
     from scipy.optimize import minimize_scalar
 
     values = function(angle)

@@ -90,7 +90,7 @@ class Evaluator:
         return values
 
     def result(self) -> Search:
-        """What was found."""
+        """The best point, and how it was found."""
         value, point = self._rows[-1]
         return Search(point, value, self.used, self.left > 0, self.best)
 

@@ -40,7 +40,7 @@ _ENDING: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 @dataclass(frozen=True)
 class Proof:
-    """What a run over a folder of cases came to.
+    """The outcome of a run over a folder of cases.
 
     Attributes
     ----------
@@ -202,7 +202,7 @@ def _digest(home: Path, wanted: Callable[[Path], bool]) -> str:
 
 
 def _machine() -> dict[str, Any]:
-    """What the seconds were measured on."""
+    """The machine on which the seconds were measured."""
     model = platform.processor()
     with contextlib.suppress(OSError):
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
@@ -258,7 +258,7 @@ class _Running:
     cpu: float = 0.0
 
     def has_ended(self) -> bool:
-        """Whether it has ended; then its processor time is noted."""
+        """True once it has ended; then its processor time is noted."""
         before = _spent()
         ended = self.process.poll() is not None
         self.cpu += _spent() - before
@@ -339,7 +339,7 @@ def _entry(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _said(entry: dict[str, Any]) -> str:
-    """What a case came to, in one line: verdict, names, and blocks that keep a mismatch without
+    """The outcome of a case in one line: verdict, names, and blocks that keep a mismatch without
     one.
     """
     if "error" in entry:
@@ -461,7 +461,7 @@ class _Run:
     def of(
         cls, cases: list[Path], target: Path, jobs: int, manifest: str | None, *, fresh: bool
     ) -> _Run:
-        """What an earlier run left of these cases."""
+        """These cases with what an earlier run left of them."""
         code, earlier, digests = (
             code_digest(),
             _before(target),

@@ -50,7 +50,7 @@ def checked(folder: Path) -> tuple[str, int]:
 
 
 def run_of(results: Path, digest: str) -> dict[str, Any]:
-    """What ``python -m trial prove`` says of its run; it must be of this manifest."""
+    """The record that ``python -m trial prove`` keeps; it must be of this manifest."""
     file = results / "run.json"
     if not file.is_file():
         return {}

@@ -1,4 +1,4 @@
-"""What is published about the muscles of the library, and from which of it their moduli come.
+"""Published facts about the muscles of the library, and those from which their moduli come.
 
 A file ``NAME.toml`` has a ``[[fact]]`` for each statement, and prior and conditions of the
 identification.
@@ -64,7 +64,7 @@ def _document(name: str) -> dict[str, Any]:
 
 
 def facts(name: str) -> list[Fact]:
-    """What is published about a muscle of the library."""
+    """Published statements about a muscle of the library."""
     return [_fact(item) for item in _document(name)["fact"]]
 
 

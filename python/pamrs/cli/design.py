@@ -170,7 +170,7 @@ def _bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
 
 
 def _least(problem: JointProblem, found: JointDesign | None) -> str:
-    """The least pressure that a search found, beside what any joint needs."""
+    """The least pressure that a search found, with what any joint needs."""
     bound = bar_and_psi(problem.least_possible_pressure())
     least = (
         "no design was found that any pressure makes good enough"
