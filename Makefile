@@ -101,7 +101,7 @@ demo: setup  ## conceal an effect, diagnose it, open the key (KIND=leak_muscle S
 # Each stage goes on where it was stopped. Exit code 3: some case could not be diagnosed, which the page says.
 prove: build  ## blinded trial from cases to prove_out/proof/trial.md, hours (SEED=7 CASES=12 JOBS=2 FOLDER=prove_out to choose)
 	$(BIN)/python -m trial write $(FOLDER) --seed $(PROVE_SEED) $(if $(CASES),--cases $(CASES)) --jobs $(JOBS)
-	$(BIN)/pamrs prove $(FOLDER) --jobs $(JOBS) || test $$? -eq 3
+	$(BIN)/python -m trial prove $(FOLDER) --jobs $(JOBS) || test $$? -eq 3
 	@mkdir -p $(PAGE)
 	$(BIN)/python -m benchmarks.baselines $(FOLDER) --jobs $(JOBS) --markdown $(PAGE)/peers.md || test $$? -eq 3
 	$(BIN)/python -m trial score --keys $(FOLDER)/keys --results $(FOLDER)/results --markdown $(PAGE)/trial.md --json $(PAGE)/scores.json --command "$(PROVE_COMMAND)"

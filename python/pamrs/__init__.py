@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from pamrs import fit, library, rigs, sweeps
-    from pamrs.design import Lift, lift, sizing
+    from pamrs.design import sizing
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
     from pamrs.diagnosis.result import Diagnosis, load_result
@@ -53,7 +53,6 @@ __all__ = [
     "FitError",
     "Issue",
     "Joint",
-    "Lift",
     "Muscle",
     "PamrsError",
     "Parameter",
@@ -70,7 +69,6 @@ __all__ = [
     "diagnose",
     "fit",
     "library",
-    "lift",
     "load_case",
     "load_recording",
     "load_result",
@@ -88,7 +86,6 @@ _MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs", 
     "sizing": "pamrs.design.sizing"
 }
 _NAMES: Final = {
-    "design": ("Lift", "lift"),
     "diagnosis": ("diagnose",),
     "diagnosis.next_experiment": ("Plan", "plan_diagnosis"),
     "diagnosis.result": ("Diagnosis", "load_result"),

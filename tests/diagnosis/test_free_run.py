@@ -16,7 +16,6 @@ import pamrs
 from pamrs.diagnosis.fit import Events, Problem, residuals
 from pamrs.diagnosis.model import _free_run
 from pamrs.diagnosis.prepare import averaged, begun_alike
-from pamrs.diagnosis.prove import valid_result
 from pamrs.diagnosis.result import schema
 from pamrs.effects import Term
 from pamrs.errors import SimulationError
@@ -28,6 +27,7 @@ from tests.diagnosis.asked import problem_of
 from tests.diagnosis.stands import WARM, vented
 from tests.diagnosis.test_assemble import NAMES, recorded
 from trial.marks import result_of as scored
+from trial.prove import valid_result
 
 
 def ran(

@@ -20,7 +20,6 @@ LAYERS = (
     ("units", "channels"),
     ("declared", "_checks"),
     (
-        "comparison",
         "findings",
         "_arrays",
         "_files",
@@ -45,16 +44,7 @@ LAYERS = (
 )
 #: The same inside the diagnosis: its steps, then the result, what is said of it, and who runs it.
 STEPS = ("settings", "prepare", "fit", "noise", "screen", "evidence", "search", "model")
-STEPS_OF_A_DIAGNOSIS = (
-    *STEPS,
-    "ready",
-    "next_experiment",
-    "result",
-    "schema",
-    "explain",
-    "",
-    "prove",
-)
+STEPS_OF_A_DIAGNOSIS = (*STEPS, "ready", "next_experiment", "result", "schema", "explain", "")
 #: Names that a module may take from the root package, which loads all others on first use.
 FROM_ROOT = {"_core", "__version__"}
 

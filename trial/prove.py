@@ -1,4 +1,4 @@
-"""Blinded trials: every case of a folder diagnosed in a process of its own that is given that
+"""Diagnose every case of a folder by ``pamrs diagnose``, each in a process that is given that
 case's folder only.
 
 The answer keys of a trial (``python -m trial write``) lie beside the cases; nothing here opens
@@ -13,46 +13,34 @@ import json
 import math
 import os
 import platform
+import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from importlib import metadata, util
 from pathlib import Path
 from typing import Any, Final
 
-from pamrs._files import resolved
-from pamrs._termination import Termination
-from pamrs._writing import check_writable, write_atomically
-from pamrs.diagnosis.result import READABLE
-from pamrs.errors import CaseError, ParameterError
-
-__all__ = [
-    "MANIFEST",
-    "SCHEMA",
-    "Proof",
-    "case_digest",
-    "cases_of",
-    "code_digest",
-    "prove",
-    "valid_result",
-    "worker",
-]
+from .concealed import write
+from .plan import MANIFEST
 
 SCHEMA: Final = "pamrs.prove/1"
-OUTSIDE: Final = "--allow-outside"
-MANIFEST: Final = "manifest.json"
+_READABLE: Final = ("pamrs.diagnosis/1", "pamrs.diagnosis/2")
 _VERDICTS: Final = ("none", "parameters", "effects", "unlisted")
+#: Time after which a case is given up [s].
 TIMEOUT: Final = 1800.0
-"""Time after which a case is given up [s]."""
+#: Time between two looks at the processes [s].
 _POLL: Final = 0.05
-"""Time between two looks at the workers [s]."""
+#: Signals that end a program; Ctrl-C is a KeyboardInterrupt already.
+_ENDING: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 @dataclass(frozen=True)
 class Proof:
-    """What a run over a folder of cases came to.
+    """The outcome of a run over a folder of cases.
 
     Attributes
     ----------
@@ -121,16 +109,16 @@ def cases_of(folder: str | os.PathLike[str]) -> tuple[list[Path], str | None]:
 
     Raises
     ------
-    CaseError
+    ValueError
         If there is no case, or the manifest does not list exactly the cases that are there.
     """
     home = Path(folder)
     if not home.is_dir():
-        raise CaseError(f"{home}: no such folder")
+        raise ValueError(f"{home}: no such folder")
     inside = home / "cases" if (home / "cases").is_dir() else home
     found = sorted(p.parent for p in inside.glob("*/case.toml"))
     if not found:
-        raise CaseError(
+        raise ValueError(
             f"{home}: no case below it; NAME/case.toml or cases/NAME/case.toml is needed"
         )
     manifest = home / MANIFEST
@@ -140,7 +128,7 @@ def cases_of(folder: str | os.PathLike[str]) -> tuple[list[Path], str | None]:
     try:
         listed = set(json.loads(content)["keys"])
     except (ValueError, KeyError, TypeError) as error:
-        raise CaseError(
+        raise ValueError(
             f"{manifest}: not a manifest, a table 'keys' from cases to digests is needed"
         ) from error
     names = {p.name for p in found}
@@ -150,7 +138,7 @@ def cases_of(folder: str | os.PathLike[str]) -> tuple[list[Path], str | None]:
     ):
         if wrong:
             more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
-            raise CaseError(f"{manifest}: {words} {', '.join(sorted(wrong)[:3])}{more}")
+            raise ValueError(f"{manifest}: {words} {', '.join(sorted(wrong)[:3])}{more}")
     return found, hashlib.sha256(content).hexdigest()
 
 
@@ -162,7 +150,7 @@ def valid_result(path: Path) -> dict[str, Any] | None:
         return None
     good = (
         isinstance(told, dict)
-        and told.get("schema") in READABLE
+        and told.get("schema") in _READABLE
         and told.get("verdict") in _VERDICTS
     )
     return told if good else None
@@ -172,17 +160,33 @@ def case_digest(folder: Path) -> str:
     """SHA-256 over every file of a case, so that a result of another case of the same name is not
     kept.
     """
-    return _digest(resolved(folder), lambda path: True)
+    return _digest(Path(os.path.realpath(folder)), lambda path: True)
 
 
 def code_digest() -> str:
-    """SHA-256 over every file of the installed package, so that results of different code can be
-    told apart.
+    """SHA-256 over every file of the installed pamrs, so that results of different code can be told
+    apart.
+
+    Raises
+    ------
+    ValueError
+        If pamrs is not installed.
     """
+    found = util.find_spec("pamrs")
+    if found is None or found.origin is None:
+        raise ValueError("pamrs is not installed: `pamrs diagnose` is what is tried")
     return _digest(
-        Path(__file__).parents[1],
+        Path(found.origin).parent,
         lambda path: path.suffix in (".py", ".so", ".pyd", ".toml", ".json"),
     )
+
+
+def _version() -> str:
+    """The version of the installed pamrs, as it says itself."""
+    try:
+        return metadata.version("pamrs")
+    except metadata.PackageNotFoundError:
+        return "0+unknown"
 
 
 def _digest(home: Path, wanted: Callable[[Path], bool]) -> str:
@@ -198,7 +202,7 @@ def _digest(home: Path, wanted: Callable[[Path], bool]) -> str:
 
 
 def _machine() -> dict[str, Any]:
-    """What the seconds were measured on."""
+    """The machine on which the seconds were measured."""
     model = platform.processor()
     with contextlib.suppress(OSError):
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
@@ -214,55 +218,56 @@ def _machine() -> dict[str, Any]:
     }
 
 
-def worker(words: Sequence[str] | None = None) -> int:
-    """Diagnose one case: ``python -m pamrs.diagnosis.prove CASE OUT``.
-
-    Parameters
-    ----------
-    words : sequence of str, optional
-        The case's folder and the file to write, before them maybe ``--allow-outside``; those of
-        this process by default.
-
-    Returns
-    -------
-    int
-        0, or 2 with one line on standard error when the case cannot be diagnosed.
+@contextlib.contextmanager
+def _signals() -> Iterator[Callable[[], None]]:
+    """Signals that end a program, raised where the function that is given is called: none comes
+    between the start of a process and its place among those that are ended with the program.
     """
-    given = list(sys.argv[1:] if words is None else words)
-    allow_outside = OUTSIDE in given
-    case, out = (word for word in given if word != OUTSIDE)
-    from pamrs.diagnosis import diagnose
-    from pamrs.errors import NotWrittenError, PamrsError
+    came: list[int] = []
+    old: dict[int, Any] = {}
+    for number in (getattr(signal, name) for name in _ENDING if hasattr(signal, name)):
+        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            old[number] = signal.signal(number, lambda n, _: came.append(n))
+
+    def check() -> None:
+        if came:
+            raise KeyboardInterrupt if came[0] == signal.SIGINT else SystemExit(128 + came[0])
 
     try:
-        result = diagnose(case, allow_outside=allow_outside)
-        try:
-            write_atomically(out, result.to_json())
-        except OSError as error:
-            why = error.strerror or str(error)
-            raise NotWrittenError(
-                f"diagnosed ({result.verdict}), but {out} could not be written ({why})"
-            ) from error
-    except (PamrsError, OSError) as error:
-        print(f"{type(error).__name__}: {error}", file=sys.stderr)
-        return 2
-    spent = os.times()
-    print(json.dumps({"cpu_seconds": round(spent.user + spent.system, 2)}))
-    return 0
+        yield check
+    finally:
+        for number, handler in old.items():
+            signal.signal(number, handler)
+
+
+def _spent() -> float:
+    """Processor time of the processes that have ended [s]."""
+    known = os.times()
+    return known.children_user + known.children_system
 
 
 @dataclass
 class _Running:
-    """A worker at work."""
+    """A diagnosis at work."""
 
     case: Path
     process: subprocess.Popen[bytes]
     home: tempfile.TemporaryDirectory[str]
     began: float
     late: bool = False
+    cpu: float = 0.0
 
-    def text(self, name: str) -> str:
-        return (Path(self.home.name) / name).read_text(encoding="utf-8", errors="replace").strip()
+    def has_ended(self) -> bool:
+        """True once it has ended; then its processor time is noted."""
+        before = _spent()
+        ended = self.process.poll() is not None
+        self.cpu += _spent() - before
+        return ended
+
+    def cried(self) -> list[str]:
+        """Lines of its standard error."""
+        text = (Path(self.home.name) / "stderr").read_text(encoding="utf-8", errors="replace")
+        return text.strip().splitlines()
 
     def close(self) -> None:
         if self.process.poll() is None:
@@ -272,7 +277,7 @@ class _Running:
 
 
 def _launch(command: Sequence[str], case: Path, out: Path) -> _Running:
-    """Start a worker in an empty folder, with one thread for linear algebra and its words in
+    """Start a diagnosis in an empty folder, with one thread for linear algebra and its words in
     files.
     """
     home = tempfile.TemporaryDirectory(prefix="pamrs-prove-")
@@ -288,32 +293,28 @@ def _launch(command: Sequence[str], case: Path, out: Path) -> _Running:
         open(Path(home.name, "stderr"), "wb") as cried,
     ):
         process = subprocess.Popen(
-            [*command, str(resolved(case)), str(resolved(out))],
+            [*command, os.path.realpath(case), "--json", os.path.realpath(out)],
             cwd=home.name, env=environment, stdin=subprocess.DEVNULL, stdout=told, stderr=cried,
         )  # fmt: skip
     return _Running(case, process, home, time.perf_counter())
 
 
 def _ended(running: _Running, out: Path) -> dict[str, Any]:
-    """The entry of a case whose worker has ended."""
-    result = valid_result(out) if running.process.returncode == 0 else None
+    """The entry of a case whose process has ended."""
+    code = running.process.returncode
+    result = valid_result(out) if code == 0 else None
     wall = round(time.perf_counter() - running.began, 2)
     if running.late:
         return {"error": f"given up after {wall:.0f} s", "wall_seconds": wall}
-    if result is None:
-        lines = running.text("stderr").splitlines()
-        code = running.process.returncode
-        why = (
-            lines[-1].strip() if lines else f"the worker ended with code {code} and wrote no result"
-        )
-        return {
-            "error": why if code >= 0 else f"the worker was killed by signal {-code}",
-            "wall_seconds": wall,
-        }
-    entry = _entry(result)
-    with contextlib.suppress(ValueError, IndexError):  # what it cost is not worth a result
-        entry |= json.loads(running.text("stdout").splitlines()[-1])
-    return {**entry, "wall_seconds": wall}
+    if result is not None:
+        spent = {"cpu_seconds": round(running.cpu, 2)} if running.cpu else {}
+        return {**_entry(result), **spent, "wall_seconds": wall}
+    if code < 0:
+        why = f"the process was killed by signal {-code}"
+    else:
+        lines = running.cried()[-1:] or [f"the process ended with code {code} and no result"]
+        why = lines[0].strip().removeprefix("pamrs: error: ")
+    return {"error": why, "wall_seconds": wall}
 
 
 def _entry(result: dict[str, Any]) -> dict[str, Any]:
@@ -338,7 +339,7 @@ def _entry(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _said(entry: dict[str, Any]) -> str:
-    """What a case came to, in one line: verdict, names, and blocks that keep a mismatch without
+    """The outcome of a case in one line: verdict, names, and blocks that keep a mismatch without
     one.
     """
     if "error" in entry:
@@ -401,7 +402,8 @@ def prove(
     say : callable, optional
         Called with a line of text for each case.
     command : sequence of str, optional
-        The worker, given a case's folder and the file to write; this module by default.
+        What diagnoses, given a case's folder, ``--json`` and the file to write; ``pamrs diagnose``
+        by default.
     allow_outside : bool
         Whether rig files and recordings may lie outside the case folders.
 
@@ -413,20 +415,19 @@ def prove(
 
     Raises
     ------
-    CaseError
+    ValueError
         If there is no case, or the manifest lists others.
-    ParameterError
+    ValueError
         If `jobs` or `limit` is less than 1, or `timeout` not positive.
     """
     if not timeout > 0.0:
-        raise ParameterError(f"timeout = {timeout} s is not allowed: it must be positive")
+        raise ValueError(f"timeout = {timeout} s is not allowed: it must be positive")
     for name, value in (("jobs", jobs), ("limit", limit)):
         if value is not None and value < 1:
-            raise ParameterError(f"{name} = {value} is not allowed: it must be at least 1")
+            raise ValueError(f"{name} = {value} is not allowed: it must be at least 1")
     found, manifest = cases_of(folder)
     target = Path(folder) / "results" if results is None else Path(results)
     target.mkdir(parents=True, exist_ok=True)
-    check_writable(target / "run.json")
     tell = say or (lambda text: None)
     run = _Run.of(found[:limit], target, jobs, manifest, fresh=fresh)
     kept = len(run.entries)
@@ -437,9 +438,10 @@ def prove(
             + (f", {other} of them made by other code (--fresh makes them again)" * bool(other))
         )
     run.record()
-    own = (sys.executable, "-m", "pamrs.diagnosis.prove", *([OUTSIDE] if allow_outside else []))
-    with Termination() as ending:
-        run.finish(command or own, jobs, timeout, tell, ending)
+    outside = ["--allow-outside"] if allow_outside else []
+    own = (sys.executable, "-m", "pamrs", "diagnose", "--quiet", *outside)
+    with _signals() as check:
+        run.finish(command or own, jobs, timeout, tell, check)
     return Proof(target, {case.name: run.entries[case.name] for case in run.cases}, kept)
 
 
@@ -459,9 +461,7 @@ class _Run:
     def of(
         cls, cases: list[Path], target: Path, jobs: int, manifest: str | None, *, fresh: bool
     ) -> _Run:
-        """What an earlier run left of these cases."""
-        from pamrs import __version__
-
+        """These cases with what an earlier run left of them."""
         code, earlier, digests = (
             code_digest(),
             _before(target),
@@ -481,7 +481,7 @@ class _Run:
                 }
         told = {
             "schema": SCHEMA,
-            "version": __version__,
+            "version": _version(),
             "code": code,
             "machine": _machine(),
             "jobs": jobs,
@@ -495,7 +495,7 @@ class _Run:
         ordered = {
             case.name: self.entries[case.name] for case in self.cases if case.name in self.entries
         }
-        write_atomically(
+        write(
             self.target / "run.json", json.dumps({**self.head, "cases": ordered}, indent=1) + "\n"
         )
 
@@ -505,26 +505,22 @@ class _Run:
         jobs: int,
         timeout: float,
         tell: Callable[[str], None],
-        ending: Termination,
+        check: Callable[[], None],
     ) -> None:
-        """Diagnose what waits, so many cases at a time, each in a process of its own.
-
-        A signal that ends the program is looked at between two steps, so that none comes between a
-        worker's start and its place among those that are ended with it.
-        """
+        """Diagnose what waits, so many cases at a time, each in a process of its own."""
         began, todo, kept = time.perf_counter(), len(self.waiting), len(self.entries)
         running: list[_Running] = []
         done = 0
         try:
             while self.waiting or running:
-                ending.check()
+                check()
                 while self.waiting and len(running) < jobs:
                     running.append(self._started(command, self.waiting.pop(0)))
                 for slow in (r for r in running if time.perf_counter() - r.began > timeout):
                     slow.process.kill()
                     slow.process.wait()
                     slow.late = True
-                ended = [r for r in running if r.process.poll() is not None]
+                ended = [r for r in running if r.has_ended()]
                 for one in ended:
                     running.remove(one)
                     entry = self._entered(one)
@@ -543,14 +539,14 @@ class _Run:
                 one.close()
 
     def _started(self, command: Sequence[str], case: Path) -> _Running:
-        """A worker on a case, whose earlier result is gone."""
+        """A diagnosis of a case, whose earlier result is gone."""
         out = self.target / case.name / "out.json"
         out.parent.mkdir(exist_ok=True)
         out.unlink(missing_ok=True)
         return _launch(command, case, out)
 
     def _entered(self, ended: _Running) -> dict[str, Any]:
-        """The entry of a case whose worker has ended, recorded."""
+        """The entry of a case whose process has ended, recorded."""
         name = ended.case.name
         entry = _ended(ended, self.target / name / "out.json")
         ended.close()
@@ -562,7 +558,3 @@ class _Run:
         }
         self.record()
         return entry
-
-
-if __name__ == "__main__":
-    raise SystemExit(worker())

@@ -1,5 +1,5 @@
-"""``pamrs prove``: processes that see one case each, resuming, errors that stay lines, what
-run.json says.
+"""``python -m trial prove``: processes that see one case each, resuming, errors that stay lines,
+what run.json says.
 """
 
 import hashlib
@@ -15,29 +15,31 @@ from pathlib import Path
 import pytest
 
 import pamrs
-from pamrs import cli
-from pamrs.diagnosis.prove import cases_of, code_digest, prove, valid_result, worker
-from pamrs.errors import CaseError, ParameterError
 from tests.diagnosis import again
 from tests.diagnosis.held import RIG, hold
+from trial.__main__ import main
+from trial.prove import cases_of, code_digest, prove, valid_result
 
-#: A worker that writes down what it was given and answers by the name of the case.
+ROOT = Path(__file__).parents[2]
+#: A diagnosis that writes down what it was given and answers by the name of the case.
 WORKER = """
 import json, os, sys
-case, out = sys.argv[1:]
+case, option, out = sys.argv[1:]
+assert option == "--json"
 name = os.path.basename(case)
 assert os.listdir() in (["stdout", "stderr"], ["stderr", "stdout"]), os.listdir()
 if name == "broken":
-    sys.exit("CaseError: the valve is upside down")
+    sys.exit("pamrs: error: the valve is upside down")
 if name == "killed":
     os.kill(os.getpid(), 9)
 verdict = "effects" if name.startswith("leak") else "none"
-seen = {"arguments": sys.argv[1:], "threads": os.environ["OPENBLAS_NUM_THREADS"], "pid": \
+seen = {"case": case, "out": out, "threads": os.environ["OPENBLAS_NUM_THREADS"], "pid": \
 os.getpid()}
 with open(out, "w") as file:
     json.dump({"schema": "pamrs.diagnosis/1", "verdict": verdict, "seconds": 1.5, "seen": seen}, \
 file)
-print(json.dumps({"cpu_seconds": 2.5}))
+while sum(os.times()[:2]) < 0.05:
+    pass
 """
 
 
@@ -75,7 +77,7 @@ def test_every_case_has_a_process_that_is_given_that_case_alone(tmp_path, fake):
     assert len({s["pid"] for s in seen}) == 3
     for name, told in zip(proof.cases, seen, strict=True):
         out = home / "results" / name / "out.json"
-        assert told["arguments"] == [str(home / "cases" / name), str(out)]
+        assert (told["case"], told["out"]) == (str(home / "cases" / name), str(out))
         assert told["threads"] == "1"
     assert len(lines) == 3
     assert "left" in lines[0]
@@ -91,8 +93,10 @@ def test_run_json_says_with_what_and_how_long(tmp_path, fake):
     digest = hashlib.sha256((home / "manifest.json").read_bytes()).hexdigest()
     assert told["manifest_sha256"] == digest
     assert told["machine"]["cores"] >= 1
-    wanted = {"verdict": "effects", "seconds": 1.5, "cpu_seconds": 2.5, "code": code_digest()}
-    assert told["cases"]["leak_a"].items() >= wanted.items()
+    entry = told["cases"]["leak_a"]
+    wanted = {"verdict": "effects", "seconds": 1.5, "code": code_digest()}
+    assert entry.items() >= wanted.items()
+    assert entry["cpu_seconds"] > 0.03
 
 
 def test_a_run_goes_on_where_it_was(tmp_path, fake):
@@ -105,7 +109,7 @@ def test_a_run_goes_on_where_it_was(tmp_path, fake):
     proof = prove(home, command=fake)
     assert proof.kept == 1
     assert len(proof.cases) == 3
-    assert proof.cases["leak_a"]["cpu_seconds"] == 2.5
+    assert "cpu_seconds" in proof.cases["leak_a"]
     assert (home / "results" / "leak_a" / "out.json").read_bytes() == first
     assert prove(home, command=["/bin/false"]).kept == 3
     assert prove(home, command=fake, fresh=True).kept == 0
@@ -134,8 +138,8 @@ def test_a_case_that_fails_is_a_line_and_is_tried_again(tmp_path, fake):
     home = make(tmp_path / "trial", "broken", "killed", "leak_a")
     proof = prove(home, command=fake, jobs=2)
     assert proof.failed == {
-        "broken": "CaseError: the valve is upside down",
-        "killed": "the worker was killed by signal 9",
+        "broken": "the valve is upside down",
+        "killed": "the process was killed by signal 9",
     }
     assert proof.verdicts["error"] == 2
     assert "error" in proof.table()
@@ -146,7 +150,7 @@ def test_interrupted_workers_are_ended(tmp_path):
     home = make(tmp_path / "trial", "a", "b")
     script = tmp_path / "worker.py"
     script.write_text(
-        "import os, sys, time\nfile = os.path.dirname(os.path.dirname(sys.argv[2])) + '/pid'\n"
+        "import os, sys, time\nfile = os.path.dirname(os.path.dirname(sys.argv[3])) + '/pid'\n"
         "if sys.argv[1].endswith('b'):\n    open(file, 'w').write(str(os.getpid()))\n"
         "    time.sleep(60)\n"
         "while not os.path.exists(file) or not open(file).read():\n    time.sleep(0.02)\n"
@@ -169,18 +173,17 @@ def test_interrupted_workers_are_ended(tmp_path):
 def test_a_signal_leaves_no_worker_and_no_folder(tmp_path, number, wait):
     home = make(tmp_path / "home", "a", "b", "c")
     slow = (
-        "import os, sys, time; open(sys.argv[2] + '.pid', 'w').write(str(os.getpid())); "
+        "import os, sys, time; open(sys.argv[3] + '.pid', 'w').write(str(os.getpid())); "
         "time.sleep(60)"
     )
     program = f"""
 import sys
-from pamrs.diagnosis.prove import prove
+from trial.prove import prove
 prove({str(home)!r}, jobs=2, command=[sys.executable, "-c", {slow!r}])
 """
     temporary = tmp_path / "tmp"
     temporary.mkdir()
-    own = str(Path(pamrs.__file__).parents[1])
-    paths = os.pathsep.join([own, os.environ.get("PYTHONPATH", "")])
+    paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     with subprocess.Popen(
         [sys.executable, "-c", program],
         env={**os.environ, "TMPDIR": str(temporary), "PYTHONPATH": paths},
@@ -215,21 +218,21 @@ def test_a_case_that_takes_too_long_is_given_up(tmp_path):
 def test_the_manifest_lists_the_cases(tmp_path, listed, words):
     home = make(tmp_path / "trial", "a", "b")
     (home / "manifest.json").write_text(json.dumps({"keys": dict.fromkeys(listed, "")}))
-    with pytest.raises(CaseError, match=words):
+    with pytest.raises(ValueError, match=words):
         prove(home)
     assert not (home / "results").exists()
 
 
 def test_what_is_refused(tmp_path):
-    with pytest.raises(CaseError, match="no such folder"):
+    with pytest.raises(ValueError, match="no such folder"):
         cases_of(tmp_path / "nowhere")
-    with pytest.raises(CaseError, match="no case below it"):
+    with pytest.raises(ValueError, match="no case below it"):
         cases_of(tmp_path)
     home = make(tmp_path / "trial", "a")
-    with pytest.raises(ParameterError, match="jobs = 0 is not allowed"):
+    with pytest.raises(ValueError, match="jobs = 0 is not allowed"):
         prove(home, jobs=0)
     (home / "manifest.json").write_text("[]")
-    with pytest.raises(CaseError, match="not a manifest"):
+    with pytest.raises(ValueError, match="not a manifest"):
         cases_of(home)
 
 
@@ -238,7 +241,7 @@ def test_two_real_cases_from_the_command_line(tmp_path, capsys):
     for name, conductance in (("one", 3e-11), ("two", 0.0)):
         sealed(trial / name, conductance)
     words = ["prove", str(trial), "--results", str(out)]
-    assert cli.main([*words, "--jobs", "2"]) == 0
+    assert main([*words, "--jobs", "2"]) == 0
     told = capsys.readouterr()
     assert "effects" in told.out
     assert "[2/2]" in told.err
@@ -246,14 +249,6 @@ def test_two_real_cases_from_the_command_line(tmp_path, capsys):
     assert verdicts == ["effects", "none"]
     (trial / "two" / "hold.csv").unlink()
     shutil.rmtree(trial / "one")
-    assert cli.main([*words, "--fresh"]) == 3
-    assert "two: CaseError" in capsys.readouterr().out
-
-
-def test_the_worker_itself(tmp_path, capsys):
-    sealed(tmp_path / "one", 3e-11)
-    assert worker([str(tmp_path / "one"), str(tmp_path / "out.json")]) == 0
-    assert json.loads(capsys.readouterr().out)["cpu_seconds"] > 0
-    assert valid_result(tmp_path / "out.json")["verdict"] == "effects"
-    assert worker([str(tmp_path / "none"), str(tmp_path / "out.json")]) == 2
-    assert "no such case folder" in capsys.readouterr().err
+    assert main([*words, "--fresh"]) == 3
+    (line,) = (text for text in capsys.readouterr().out.splitlines() if text[:5] == "two: ")
+    assert "hold.csv; copy it there" in line

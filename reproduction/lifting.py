@@ -1,5 +1,5 @@
-"""What an arm can lift and hold: the torque of its muscles at a pressure against that of gravity,
-over the joint's range.
+"""Payloads that an arm lifts and holds: the torque of its muscles at a pressure against that of
+gravity, over the joint's range.
 
 Statics only: pressure is taken as reached slowly, so that nothing is carried on by its swing.
 Coulomb friction of the arm and hysteresis of the muscles are losses while lifting and help while
@@ -9,40 +9,29 @@ holding.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import checked_number, doubt_pascals, quantities, whole
-from pamrs._views import Panels, View
-from pamrs._writing import write_atomically
-from pamrs.effects import ports_of
+from pamrs._checks import checked_number, whole
 from pamrs.errors import ParameterError
-from pamrs.findings import to_plain
 from pamrs.rig import Joint
+from pamrs.simulation import core_rig
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
 Array = NDArray[np.float64]
 
-#: Ports at which an effect changes no static torque at a given pressure: those of the gas, and of
-#: what is recorded.
-_WITHOUT_TORQUE: Final = frozenset(
-    ("command", "passage", "clearance", "leak", "inflow", "feed", "balance", "reading", "clock")
-)
 _LIFTING, _HOLDING = -1.0, 1.0  # direction of the muscles: shortening, about to be drawn out
 
 
 @dataclass(frozen=True, eq=False)
-class Lift(View):
-    """What :func:`lift` found; SI units, angles from the vertical.
+class Lift:
+    """Result of :func:`lift`; SI units, angles from the vertical.
 
     Attributes
     ----------
@@ -81,8 +70,6 @@ class Lift(View):
         joint, None where not even the empty arm is lifted.
     limit_angle : float
         Where that is decided [rad].
-    left_out : tuple of str
-        Effects of the rig that change a torque and are not counted.
     """
 
     rig: str
@@ -102,108 +89,12 @@ class Lift(View):
     margin_angle: float
     payload_limit: float | None
     limit_angle: float
-    left_out: tuple[str, ...] = ()
-
-    @property
-    def lifts(self) -> NDArray[np.bool_]:
-        """Whether the muscles overcome gravity and friction, at each angle."""
-        return np.asarray(self.torque - self.coulomb > self.gravity)
-
-    @property
-    def holds(self) -> NDArray[np.bool_]:
-        """Whether the muscles and friction keep the arm from sinking, at each angle."""
-        return np.asarray(self.torque_holding + self.coulomb >= self.gravity)
-
-    @property
-    def text(self) -> str:
-        """The result in one or two sentences."""
-        load, bar = _kg(self.payload), f"{self.pressure / 1e5:.3g} bar"
-        first, last = _degrees(self.angle[0]), _degrees(self.angle[-1])
-        if self.can_lift:
-            least = f"least margin {self.margin:.3g} N m at {_degrees(self.margin_angle)} deg"
-            return f"lifts {load} from {first} to {last} deg at {bar}: {least}; {self._limit()}"
-        at = float(np.interp(self.reached, self.angle, self.gravity))
-        muscles = float(np.interp(self.reached, self.angle, self.torque))
-        lost = f" less {self.coulomb:.3g} N m of friction" if self.coulomb else ""
-        lifted = self.reached > self.angle[0]
-        where = f"beyond {_degrees(self.reached)} deg" if lifted else f"off its stop at {first} deg"
-        balance = f"there the muscles give {muscles:.4g} N m{lost}, gravity takes {at:.4g} N m"
-        again = "".join(
-            f"; brought there, it goes on from {_degrees(a)} to {_degrees(b)} deg"
-            for a, b in self.regained
-        )
-        return f"cannot lift {load} {where} at {bar}: {balance}{again}; {self._limit()}"
-
-    def _limit(self) -> str:
-        last = _degrees(self.angle[-1])
-        if self.payload_limit is None:
-            return f"up to {last} deg it does not even lift the empty arm"
-        if math.isinf(self.payload_limit):
-            return f"up to {last} deg no payload weighs on the joint"
-        return (
-            f"up to {last} deg at most {_kg(self.payload_limit)}, decided at "
-            f"{_degrees(self.limit_angle)} deg"
-        )
-
-    def summary(self) -> str:
-        """The result as text: the sentence, and torques and capacity at a dozen angles."""
-        rows = np.unique(np.linspace(0, self.angle.size - 1, 13).round().astype(int))
-        lines = [
-            f"{self.rig}: {self.text}",
-            "",
-            "angle [deg]  muscles [N m]  gravity [N m]  margin [N m]  lifts up to [kg]  payload is",
-        ]
-        for row in rows.tolist():
-            margin = self.torque[row] - self.coulomb - self.gravity[row]
-            state = "lifted" if self.lifts[row] else "held" if self.holds[row] else "not held"
-            numbers = (
-                f"{math.degrees(self.angle[row]):>11.1f}{self.torque[row]:>15.1f}"
-                f"{self.gravity[row]:>15.1f}{margin:>14.1f}"
-            )
-            lines.append(f"{numbers}{max(float(self.capacity[row]), 0.0):>18.1f}  {state}")
-        if self.left_out:
-            lines += ["", f"without the effects of the rig: {', '.join(self.left_out)}"]
-        return "\n".join(lines)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything as numbers and lists, SI units; what is infinite becomes None."""
-        told = {"lifts": self.lifts.tolist(), "holds": self.holds.tolist(), "text": self.text}
-        return {**to_plain(vars(self)), **told}
-
-    def _panels(self) -> Panels:
-        from pamrs.design import _lifting_figure as figure
-
-        return {
-            "torque": partial(figure.draw_torques, result=self),
-            "payload": partial(figure.draw_capacity, result=self),
-        }
-
-    def _numbers(self) -> dict[str, str]:
-        return {"rig": self.rig, "pressure": f"{self.pressure / 1e5:.4g} bar", "result": self.text}
-
-    def figure(self, path: str | os.PathLike[str]) -> Path:
-        """Write a picture of torques and capacity over the angle, a PNG.
-
-        Parameters
-        ----------
-        path : path-like
-            The file.
-
-        Returns
-        -------
-        Path
-            The file written.
-        """
-        from pamrs.design._lifting_figure import lift_png
-
-        return write_atomically(path, lift_png(self))
 
 
-@quantities
 def lift(
     rig: Rig, *, pressure: float | None = None, to: float | None = None, points: int = 721
 ) -> Lift:
-    """What a one-link rig lifts and holds at a pressure.
+    """Find what a one-link rig lifts and holds at a pressure.
 
     At each angle the torque of the muscles ``n F(P, d(theta)/L0) dd/dtheta`` is compared
     with gravity's ``(m lc + mp l) g sin(theta)`` (sections 4 and 5 of the physics reference;
@@ -230,16 +121,7 @@ def lift(
     ParameterError
         If the rig has no muscle, joint or arm, there is no pressure, a value is not finite or
         outside its range; the message names it.
-
-    Examples
-    --------
-    >>> import pamrs
-    >>> result = pamrs.lift(pamrs.rigs.named("elbow"), pressure=8.3e5)
-    >>> result.can_lift, round(result.payload_limit, 1)
-    (False, 9.8)
     """
-    from pamrs.simulation import core_rig
-
     missing = [block for block in ("muscle", "joint", "arm") if block not in rig.blocks]
     if missing:
         raise ParameterError(
@@ -273,13 +155,6 @@ def lift(
     regained = tuple(zip(later[::2], later[1::2], strict=False))
     margin_angle = _least(balance.excess, angle)
     limit, limit_angle = balance.limit(angle)
-    left_out = tuple(
-        dict.fromkeys(
-            e["id"]
-            for e in rig.effects
-            if e["id"] != "muscle_hysteresis" and not _WITHOUT_TORQUE.issuperset(ports_of(e))
-        )
-    )
     return Lift(
         rig=rig.name,
         pressure=pressure,
@@ -298,7 +173,6 @@ def lift(
         margin_angle=margin_angle,
         payload_limit=limit,
         limit_angle=limit_angle,
-        left_out=left_out,
     )
 
 
@@ -354,14 +228,14 @@ class _Balance:
         return np.asarray(self.arm["length"] * self.arm["gravity"] * np.sin(direction))
 
     def own(self, angle: Array) -> Array:
-        """What holds the empty arm against gravity and a spring across the joint [N m]."""
+        """Torque that holds the empty arm against gravity and a spring across the joint [N m]."""
         direction = angle + self.arm.get("base_angle", 0.0) + self.arm.get("centre_angle", 0.0)
         weight = self.arm["first_moment"] * self.arm["gravity"] * np.sin(direction)
         spring = self.joint.get("stiffness", 0.0) * (angle - self.joint.get("spring_angle", 0.0))
         return np.asarray(weight + spring)
 
     def gravity(self, angle: Array) -> Array:
-        """What holds the arm with its payload [N m]."""
+        """Torque that holds the arm with its payload [N m]."""
         return np.asarray(self.own(angle) + self.arm["payload"] * self.weight(angle))
 
     def excess(self, angle: Array) -> Array:
@@ -373,7 +247,7 @@ class _Balance:
         return self.torque(angle, _HOLDING) + self.coulomb - self.gravity(angle)
 
     def free(self, angle: Array) -> Array:
-        """What lifts a payload: muscles less friction less the empty arm [N m]."""
+        """Torque left for a payload: muscles less friction less the empty arm [N m]."""
         return self.torque(angle, _LIFTING) - self.coulomb - self.own(angle)
 
     def capacity(self, angle: Array) -> Array:
@@ -405,9 +279,7 @@ def _pressure(rig: Rig, pressure: float | None) -> float:
                 "be taken"
             )
         return max(float(supply["initial_pressure"]) for supply in rig.tables("supply").values())
-    known = checked_number("pressure", pressure, 0.0, 1e8, "Pa")
-    doubt_pascals("pressure", known, inside=3)
-    return known
+    return checked_number("pressure", pressure, 0.0, 1e8, "Pa")
 
 
 def _of_one(function: Callable[[Array], Array]) -> Callable[[float], float]:
@@ -416,7 +288,7 @@ def _of_one(function: Callable[[Array], Array]) -> Callable[[float], float]:
 
 
 def _crossings(function: Callable[[Array], Array], angle: Array) -> list[float]:
-    """Where a function changes sign between the first and the last angle."""
+    """Angles at which a function changes sign."""
     from scipy.optimize import brentq
 
     positive, found = function(angle) > 0.0, []
@@ -427,7 +299,7 @@ def _crossings(function: Callable[[Array], Array], angle: Array) -> list[float]:
 
 
 def _least(function: Callable[[Array], Array], angle: Array) -> float:
-    """Where a function is least over the angles, refined between its neighbours."""
+    """Angle at which a function is least, refined between its neighbours."""
     from scipy.optimize import minimize_scalar
 
     values = function(angle)
@@ -451,7 +323,3 @@ def _held(balance: _Balance, angle: Array) -> float:
 
 def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.1f}"
-
-
-def _kg(mass: float) -> str:
-    return f"{mass:.4g} kg"

@@ -4,16 +4,13 @@ differs / cannot tell.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-from pamrs import comparison
-from pamrs._checks import one_of
-from pamrs.comparison import Comparison, judge, verdicts
-from pamrs.library import Entry, Fact, entry, names
-from pamrs.library.evaluate import KINDS
+from pamrs.library import Entry, entry, names
 from pamrs.units import parse_unit
+from reproduction.comparison import Comparison, judge
+from reproduction.muscles import Fact, facts
+from reproduction.muscles.evaluate import KINDS
 
-__all__ = ["Comparison", "compare", "compare_all", "compare_entry", "headings", "table", "verdicts"]
+__all__ = ["compare", "compare_entry", "headings"]
 
 
 def compare(name: str) -> list[Comparison]:
@@ -31,7 +28,7 @@ def compare(name: str) -> list[Comparison]:
     Raises
     ------
     ParameterError
-        If there is no such muscle, or its file has a kind of fact that is not known.
+        If there is no such muscle.
     """
     return compare_entry(entry(name))
 
@@ -48,12 +45,7 @@ def compare_entry(item: Entry) -> list[Comparison]:
     -------
     list of Comparison
     """
-    return [_compare(item, fact) for fact in item.facts]
-
-
-def compare_all() -> list[Comparison]:
-    """Compare every published fact of every muscle of the library."""
-    return [row for name in names() for row in compare(name)]
+    return [_compare(item, fact) for fact in facts(item.name)]
 
 
 def headings() -> dict[str, str]:
@@ -61,15 +53,7 @@ def headings() -> dict[str, str]:
     return {name: f"{name}: {entry(name).title}" for name in names()}
 
 
-def table(rows: Iterable[Comparison], *, notes: bool = True, titles: bool = True) -> str:
-    """The comparison as text, as :func:`pamrs.comparison.table`, under the titles of the
-    muscles.
-    """
-    return comparison.table(rows, notes=notes, titles=titles, headings=headings())
-
-
 def _compare(item: Entry, fact: Fact) -> Comparison:
-    one_of(f"{item.name}: fact kind", fact.kind, KINDS)
     scale = parse_unit(fact.unit).scale
     return judge(
         item.name,

@@ -1,14 +1,12 @@
-"""The command line of muscles: the library, and sizing."""
+"""The command line of sizing."""
 
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from pamrs import library, load_rig
+from pamrs import library, rigs
 from pamrs.design.sizing import Filling, Requirement, size
-from pamrs.library.published import compare
 from tests.scripts import command as run
 from tests.tables import rows_of
 
@@ -29,76 +27,6 @@ def assert_refused(capsys, words, parts):
 def line_of(text, start):
     """The words of the line that starts with ``start``."""
     return next(line for line in text.splitlines() if line.strip().startswith(start)).split()
-
-
-# ----------------------------------------------------------------------- library
-
-
-def test_library_lists_every_muscle_with_its_pressure_and_mass(capsys):
-    code, out, err = run(capsys, "library")
-    assert (code, err) == (0, "")
-    for name in library.names():
-        item = library.entry(name)
-        words = line_of(out, name)
-        assert words[0] == name
-        assert float(words[1]) == pytest.approx(item.max_pressure / 1e5, rel=1e-4)
-        assert words[2] == "bar"
-        mass = None if words[3] == "unknown" else pytest.approx(float(words[3]), rel=1e-4)
-        assert item.mass == mass
-        assert item.title in out
-
-
-@pytest.mark.parametrize("name", library.names())
-def test_a_muscle_is_shown_with_the_origin_of_each_number(capsys, name):
-    code, out, _ = run(capsys, "library", name)
-    item = library.entry(name)
-    assert code == 0
-    for key, origin in item.origins.items():
-        assert origin in " ".join(line_of(out, f"{key} "))
-    own = item.parameters
-    for key, value in (
-        ("rest_length", 1e3 * own["rest_length"]),
-        ("braid_angle", np.degrees(own["braid_angle"])),
-        ("modulus_offset", own["modulus_offset"][0] / 1e6),
-    ):
-        assert float(line_of(out, key)[1].rstrip(",")) == pytest.approx(value, rel=1e-4)
-    rows = compare(name)
-    for row in rows:
-        assert f"{row.fact} " in out
-    own = sum(row.verdict == "agree" and not row.basis for row in rows)
-    assert out.splitlines()[-1].startswith(f"{own} agree on their own")
-
-
-@pytest.mark.parametrize("name", library.names())
-def test_the_rig_of_a_muscle_has_that_muscle(capsys, tmp_path, name):
-    path = tmp_path / "out.toml"
-    code, out, err = run(capsys, "library", name, "--rig", path)
-    assert code == 0
-    assert out.startswith(f"{name}: ")
-    assert f"written: {path}" in err
-    rig = load_rig(path)
-    assert rig.name == name
-    assert rig.muscle.parameters == library.entry(name).muscle.parameters
-    volume = 0.1 * float(rig.muscle.air_volume(0.0))
-    assert rig.parameter("chamber.dead_volume").value == pytest.approx(volume)
-
-
-@pytest.mark.parametrize(
-    ("words", "parts"),
-    [
-        (["elbow"], ["'elbow' is not in the library", "elbow_0625in"]),
-        (["--rig", "out.toml"], ["--rig needs the NAME"]),
-        (["pam_a_1in", "--rig", "no_folder/out.toml"], ["folder no_folder does not exist"]),
-        (["no_such", "--rig", "out.toml"], ["'no_such' is not in the library"]),
-    ],
-)
-def test_wrong_words_to_library_write_nothing(capsys, tmp_path, monkeypatch, words, parts):
-    monkeypatch.chdir(tmp_path)
-    assert_refused(capsys, ["library", *words], parts)
-    assert list(tmp_path.iterdir()) == []
-
-
-# ------------------------------------------------------------------------- sizing
 
 
 def test_size_prints_and_writes_what_the_function_gives(capsys, tmp_path):
@@ -138,7 +66,7 @@ def test_the_valve_is_an_area_or_a_conductance(capsys):
 
 def test_a_rig_file_is_a_candidate_at_a_pressure(capsys, tmp_path):
     path = tmp_path / "a.toml"
-    assert run(capsys, "library", "pam_a_1in", "--rig", path)[0] == 0
+    rigs.bench(library.pam_a_1in(), "pam_a_1in").to_toml(path)
     code, out, _ = run(capsys, "size", *POINTS, path, "pam_a_1in", "--pressure", "11 bar")
     assert code == 0
     assert line_of(out, "blocked force")[3] == line_of(out, "blocked force")[4]

@@ -5,7 +5,7 @@ tell, and what an agreement rests on.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
@@ -19,7 +19,6 @@ __all__ = [
     "VERDICTS",
     "Comparison",
     "judge",
-    "table",
     "verdicts",
 ]
 
@@ -216,51 +215,6 @@ def judge(
         apart=apart,
         reason=reason,
     )
-
-
-def table(
-    rows: Iterable[Comparison],
-    *,
-    notes: bool = True,
-    titles: bool = True,
-    headings: Mapping[str, str] | None = None,
-) -> str:
-    """The comparison as text, one line per statement.
-
-    Parameters
-    ----------
-    rows : iterable of Comparison
-        The statements.
-    notes : bool
-        Whether source and remark follow each line.
-    titles : bool
-        Whether a line names each group before its statements.
-    headings : mapping of str to str, optional
-        What that line says, by group; the group itself by default.
-
-    Returns
-    -------
-    str
-    """
-    rows = list(rows)
-    width = max([52, *(len(row.fact) for row in rows)])
-    lines = [
-        f"{'fact':<{width}} {'published':>10} {'ours':>10} {'unit':<7} {'deviation':>9}  verdict"
-    ]
-    group = ""
-    for row in rows:
-        if titles and row.group != group:
-            group = row.group
-            lines += ["", (headings or {}).get(group, group)]
-        published, ours = row.shown
-        line = (
-            f"{row.fact:<{width}} {published:>10} {ours:>10} {row.unit:<7} {row.gap:>9}  "
-            f"{row.told_verdict}"
-        )
-        lines.append(line.rstrip())
-        if notes:
-            lines.append(f"    {row.where}{': ' + row.remark if row.remark else ''}")
-    return "\n".join(lines)
 
 
 def verdicts(rows: Sequence[Comparison]) -> str:

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pamrs.design.sizing import free_contraction
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
-    from pamrs.library._entry import Entry
+    from pamrs.library import Entry
     from pamrs.rig import Muscle
 
-__all__ = ["KINDS", "activation_pressure", "root_between", "free_contraction", "polynomial"]
+__all__ = ["KINDS", "activation_pressure", "polynomial", "root_between"]
 
 At = dict[str, float]
 
@@ -31,44 +32,6 @@ def root_between(function: Callable[[float], float], low: float, high: float) ->
     if function(low) * function(high) > 0.0:
         return None
     return float(brentq(function, low, high, xtol=1e-16, rtol=1e-14))
-
-
-def free_contraction(muscle: Muscle, pressure: float) -> float:
-    """Contraction at which the unloaded muscle comes to rest [1].
-
-    Parameters
-    ----------
-    muscle : Muscle
-        The muscle.
-    pressure : float
-        Gauge pressure [Pa], above zero.
-
-    Returns
-    -------
-    float
-        The smallest contraction at which the force is zero, or the braid's limit where the force
-        still pulls there.
-
-    Raises
-    ------
-    ParameterError
-        If the pressure is not finite and positive.
-    """
-    if not (math.isfinite(pressure) and pressure > 0.0):
-        raise ParameterError(
-            f"pressure = {pressure} Pa is not allowed: a finite gauge pressure above zero is needed"
-        )
-    limit = muscle.contraction_limits[1]
-    grid = np.linspace(0.0, limit, 401)
-    pushing = np.flatnonzero(muscle.force(pressure, grid) <= 0.0)
-    if pushing.size == 0:
-        return float(limit)
-    first = int(pushing[0])
-    if first == 0:
-        return 0.0
-    low, high = float(grid[first - 1]), float(grid[first])
-    found = root_between(lambda e: float(muscle.force(pressure, e)), low, high)
-    return float(grid[first]) if found is None else found
 
 
 def activation_pressure(muscle: Muscle, contraction: float = BEGINS) -> float:

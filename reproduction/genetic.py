@@ -1,27 +1,76 @@
-"""The genetic algorithm of dissertation 3.5 in DEAP's operators, and NSGA-II for two objectives."""
+"""The genetic algorithm of dissertation 3.5 in DEAP's operators."""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from deap import base, tools  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pamrs.design._evaluator import Evaluator, Genetic
+from pamrs._checks import checked_number, positive, whole
+from pamrs.errors import ParameterError
+
+if TYPE_CHECKING:
+    from reproduction.searches import Evaluator
 
 Array = NDArray[np.float64]
 Member = Any  # a list of genes with a fitness
 
 
+@dataclass(frozen=True)
+class Genetic:
+    """Settings of the genetic algorithm; the defaults are those of 3.5 where it prints them.
+
+    Parameters
+    ----------
+    population : int
+        Designs in a generation.
+    elites : int
+        Best ones that survive; the two best are the parents of all others.
+    bits : int
+        Binary digits of each length (not printed).
+    mutation : float
+        Probability that a child gets one of its lengths at random (not printed; the text names
+        MATLAB's ``ga()``, which by default makes a fifth of the children by mutation, and has the
+        same population, elites and generations).
+    tolerance : float or None
+        The search has converged when the best fitness fell by less than this share over ``stall``
+        generations; None runs all generations. The text prints neither number; these are MATLAB's.
+    stall : int
+        See ``tolerance``.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not possible.
+    """
+
+    population: int = 20
+    elites: int = 2
+    bits: int = 12
+    mutation: float = 0.2
+    tolerance: float | None = 1e-6
+    stall: int = 50
+
+    def __post_init__(self) -> None:
+        if self.elites < 2 or self.population <= self.elites:
+            raise ParameterError(
+                f"population = {self.population}, elites = {self.elites} are not allowed: "
+                "at least two elites, and more designs than those, are needed"
+            )
+        whole("bits", self.bits, 1, 52)
+        checked_number("mutation", self.mutation, 0.0, 1.0)
+        whole("stall", self.stall, 1)
+        if self.tolerance is not None:
+            positive("tolerance", self.tolerance, zero=True)
+
+
 class _Fitness(base.Fitness):  # type: ignore[misc]
     weights = (-1.0,)
-
-
-class _TwoFitness(base.Fitness):  # type: ignore[misc]
-    weights = (-1.0, -1.0)
 
 
 class _Genes(list[Any]):
@@ -30,14 +79,6 @@ class _Genes(list[Any]):
     def __init__(self, values: Any = ()) -> None:
         super().__init__(values)
         self.fitness = _Fitness()
-
-
-class _Point(list[float]):
-    """Coordinates in the unit cube."""
-
-    def __init__(self, values: Any = ()) -> None:
-        super().__init__(values)
-        self.fitness = _TwoFitness()
 
 
 def decode(genes: Sequence[int], bits: int) -> Array:
@@ -123,54 +164,3 @@ def _settled(best: Array, settings: Genetic) -> bool:
         return False
     earlier = float(best[-1 - settings.stall])
     return earlier - float(best[-1]) <= settings.tolerance * abs(earlier)
-
-
-def evolve_two(
-    objectives: Callable[[Array], Array],
-    size: int,
-    *,
-    population: int,
-    generations: int,
-    progress: Callable[[int, int], None] | None,
-) -> Array:
-    """NSGA-II (Deb 2002, with its usual settings) for two objectives on the unit cube.
-
-    Parameters
-    ----------
-    objectives : callable
-        Points (n, size) to values (n, 2), both to be small.
-    size : int
-        Coordinates.
-    population : int
-        Members, a multiple of four.
-    generations : int
-        Rounds after the random start.
-    progress : callable, optional
-        Called with the generations done and their number.
-
-    Returns
-    -------
-    ndarray, shape (k, size)
-        The members that none other beats in both objectives.
-    """
-    crossing = {"eta": 20.0, "low": 0.0, "up": 1.0}
-    members = [_Point(random.random() for _ in range(size)) for _ in range(population)]
-    _assign_two(members, objectives)
-    members = tools.selNSGA2(members, population)
-    for generation in range(generations):
-        children = [_Point(member) for member in tools.selTournamentDCD(members, population)]
-        for first, second in zip(children[::2], children[1::2], strict=True):
-            if random.random() < 0.9:
-                tools.cxSimulatedBinaryBounded(first, second, **crossing)
-            for member in (first, second):
-                tools.mutPolynomialBounded(member, **crossing, indpb=1.0 / size)
-        _assign_two(children, objectives)
-        members = tools.selNSGA2(members + children, population)
-        if progress is not None:
-            progress(generation + 1, generations)
-    return np.array(tools.sortNondominated(members, population, first_front_only=True)[0])
-
-
-def _assign_two(members: list[_Point], objectives: Callable[[Array], Array]) -> None:
-    for member, values in zip(members, objectives(np.array(members)).tolist(), strict=True):
-        member.fitness.values = tuple(values)
