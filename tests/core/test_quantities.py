@@ -143,7 +143,12 @@ def test_a_quantity_is_what_it_is_in_si(name: str) -> None:
         (lambda: SHOULDER.with_parameters({"arm.payload": 3 * U.m}), "arm.payload = .* in kg"),
         (lambda: pamrs.simulate(SHOULDER, 5.0, sample_time=3 * U.m, duration=1), "sample_time = "),
         (
-            lambda: pamrs.sweeps.Grid({"arm.payload": U.Quantity([1.0, 2.0], "kg")}),
+            lambda: pamrs.sweep(
+                SHOULDER,
+                {"arm.payload": U.Quantity([1.0, 2.0], "kg")},
+                {"end": ("final", "joint_angle")},
+                sample_time=5e-3,
+            ),
             "arm.payload = .* plain numbers are needed here, in SI units",
         ),
         (

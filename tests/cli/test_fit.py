@@ -1,4 +1,4 @@
-"""Report, figures and command line of a muscle fit."""
+"""The command line of muscle fits: ``pamrs fit muscle``."""
 
 import json
 import re
@@ -9,9 +9,6 @@ import numpy as np
 import pytest
 
 from pamrs import load_rig, rigs
-from pamrs.fit import compare_models, fit_muscle
-from pamrs.fit import report as pages
-from pamrs.fit.remarks import headline, limits, meaning, percent, residual_pattern
 from pamrs.rig import Muscle
 from pamrs.rig.muscle_models import MODELS
 from tests.fit.cases import grid, joined, mapped, remade
@@ -59,126 +56,6 @@ def table(data, tmp_path_factory):
     return path
 
 
-@pytest.fixture(scope="module")
-def fit(data, muscle):
-    return fit_muscle(data, muscle)
-
-
-def words_of(page):
-    """What a reader sees, figures and style left out."""
-    text = re.sub(r"<svg.*?</svg>|<style>.*?</style>", " ", page, flags=re.DOTALL)
-    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text))
-
-
-# ------------------------------------------------------------------------- pages
-
-
-def test_page_is_whole_and_loads_nothing(fit):
-    page = pages.render_html(fit)
-    assert page.startswith("<!DOCTYPE html>")
-    assert page.rstrip().endswith("</html>")
-    assert page.count("<svg") == page.count("</svg>") == 4
-    assert not re.search(r"<(script|link|img)\b", page)
-    assert not re.search(r'(src|href)="(?!#|data:)', page)
-    ids = re.findall(r'\bid="([^"]+)"', page)
-    assert len(ids) == len(set(ids))
-    assert "nan" not in words_of(page).lower().split()
-
-
-def test_page_says_what_was_fitted_and_how_good_it_is(fit):
-    words = words_of(pages.render_html(fit, command="pamrs fit muscle bench.csv"))
-    assert headline(fit) in words
-    assert "bench 7: 40 of 42 rows are used, at 6 pressures from 100 to 600 kPa" in words
-    assert "2 rows of 42 have no number for length, pressure or force: not used" in words
-    for value in (fit.rms_error, fit.max_error, fit.leave_one_pressure_out().rms):
-        assert f"{percent(value)} " in words
-    for name, p in fit.params.items():
-        assert name in words
-        assert p.stderr > 0
-    assert "pamrs fit muscle bench.csv" in words
-    assert "modulus_slope = { value = [" in words
-    assert "kothera" in words
-
-
-def test_page_of_a_fit_on_few_pressures_shows_the_others(data, muscle):
-    fit = fit_muscle(data, muscle, levels=[0, 2, 5])
-    words = words_of(pages.render_html(fit))
-    assert "Fitted on 3 pressures" in words
-    assert "predicts the other 3" in words
-    assert words.count("left out") >= 3
-    assert f"{100 * fit.errors_of('held_out')[1]:.2g} %" in words
-
-
-def test_page_compares_models(data, muscle, fit):
-    comparison = compare_models(data, muscle, orders=(1, 2), levels=[0, 2, 5])
-    words = words_of(pages.render_html(fit, comparison))
-    assert all(row["model"] in words for row in comparison.rows)
-    assert "take this" in words
-    assert "fitted on 100, 300, 600 kPa only" in words
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"model": "gaylord"},
-        {"model": "mooney_rivlin"},
-        {"moduli": "per_level"},
-        {"free": ["braid_angle"]},
-    ],
-)
-def test_every_kind_of_fit_has_a_page(data, muscle, options):
-    page = pages.render_html(fit_muscle(data, muscle, **options))
-    assert page.count("<svg") == (3 if options.get("model") == "gaylord" else 4)
-
-
-def test_text_from_files_is_escaped(muscle):
-    p, e = grid(LEVELS, np.linspace(0.01, 0.19, 5))
-    evil = mapped(p, e, muscle.force(p, e), REST, name="<b>x</b>")
-    page = pages.render_html(fit_muscle(evil, muscle), command="<script>")
-    assert "<b>x</b>" not in page
-    assert "<script>" not in page
-
-
-def test_directions_draw_both_branches(muscle):
-    rubbing = muscle.replace(friction_coefficient=0.05)
-    p, e, d = grid(LEVELS, np.linspace(0.01, 0.19, 5), [-1.0, 1.0])
-    loop = mapped(p, e, rubbing.force(p, e, direction=d), REST, direction=d)
-    page = pages.render_html(fit_muscle(loop, rubbing))
-    assert "model, contracting" in page
-    assert "model, lengthening" in page
-
-
-def test_png_has_the_promised_size(fit, tmp_path):
-    path = pages.write_figure(fit, tmp_path / "fit.png")
-    head = path.read_bytes()[:24]
-    assert head[:8] == b"\x89PNG\r\n\x1a\n"
-    assert (int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")) == (1600, 1000)
-    page = pages.write_report(fit, tmp_path / "fit.html")
-    assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE")
-
-
-# ------------------------------------------------------------------------- words
-
-
-def test_structure_of_the_residual_is_told_from_noise(data, muscle, fit):
-    assert residual_pattern(fit).by_contraction < 0.5
-    wrong = fit_muscle(data, muscle, model="gaylord")
-    assert residual_pattern(wrong).by_contraction > 0.5
-    assert any("repeats at the same contraction" in line for line in limits(wrong))
-    assert not any("repeats at the same contraction" in line for line in limits(fit))
-
-
-def test_the_bladder_share_is_gas_force_minus_model(fit, muscle):
-    line = meaning(fit)[0]
-    gas = LEVELS[-1] * float(muscle.gas_area(0.01))
-    assert float(re.search(r"would pull (\d+) N", line)[1]) == pytest.approx(gas, rel=1e-3)
-    taken = float(re.search(r"takes ([\d.]+) N", line)[1])
-    assert taken == pytest.approx(gas - float(muscle.force(LEVELS[-1], 0.01)), abs=3.0)
-
-
-# ----------------------------------------------------------------- command line
-
-
 def run(capsys, *words):
     """Standard output and standard error of a command that ends well."""
     code, out, err = command(capsys, "fit", "muscle", *words)
@@ -194,8 +71,8 @@ def refused(capsys, *words):
 
 
 def test_command_writes_everything(capsys, table, tmp_path):
-    files = {name: tmp_path / f"out.{name}" for name in ("html", "json", "toml", "png")}
-    outputs = zip(("--report", "--json", "--rig", "--png"), files.values(), strict=True)
+    files = {name: tmp_path / f"out.{name}" for name in ("json", "toml", "png")}
+    outputs = zip(("--json", "--rig", "--png"), files.values(), strict=True)
     out, err = run(capsys, table, *KOTHERA, "--free", "braid-angle", *sum(outputs, ()))
     for words in (
         "kothera, order 2",
@@ -203,7 +80,7 @@ def test_command_writes_everything(capsys, table, tmp_path):
         "2 rows of 42 have no number",
     ):
         assert words in out
-    assert err.count("written: ") == 4
+    assert err.count("written: ") == 3
     document = json.loads(files["json"].read_text(encoding="utf-8"))
     assert document["schema"] == "pamrs.muscle_fit/1"
     assert document["fit"]["rms_error"] < 0.01
@@ -213,9 +90,9 @@ def test_command_writes_everything(capsys, table, tmp_path):
     rig = load_rig(files["toml"])
     assert rig.muscle.model == "kothera"
     assert rig.muscle.parameters["modulus_slope"] == [fitted["m1"]["value"], fitted["m2"]["value"]]
-    page = words_of(files["html"].read_text(encoding="utf-8"))
-    assert "pamrs fit muscle" in page
-    assert "--free braid-angle" in page
+    assert document["command"].startswith("pamrs fit muscle")
+    assert "--free braid-angle" in document["command"]
+    assert files["png"].read_bytes().startswith(b"\x89PNG")
     assert sorted(tmp_path.iterdir()) == sorted(files.values())
 
 
@@ -329,19 +206,17 @@ def test_a_tolerance_of_what_is_not_free_is_named(capsys, table, tmp_path):
 
 
 @pytest.mark.parametrize("levels", [[], THREE])
-def test_a_level_at_rest_has_a_page_and_pictures(capsys, data, tmp_path, levels):
+def test_a_level_at_rest_is_told_and_drawn(capsys, data, tmp_path, levels):
     e = np.linspace(0.01, 0.19, 7)
     rest = mapped(0 * e, e, -0.5 * np.cos(9 * e), REST)
     path = write(tmp_path / "rest.csv", joined(data, rest))
-    page, result = tmp_path / "x.html", tmp_path / "x.json"
-    outputs = ["--report", page, "--png", tmp_path / "x.png", "--json", result]
-    out, _ = run(capsys, path, *KOTHERA, "--compare", *outputs, *levels)
-    assert "0 kPa: not in this table" in out
-    words = words_of(page.read_text(encoding="utf-8"))
-    assert "0 kPa: not in this table, the largest force there is below 1 % of the map" in words
-    assert not {"nan", "inf"} & set(re.findall(r"[a-z]+", (out + words).lower()))
-    assert ("Fitted on 3 pressures" in words) == bool(levels)
-    assert ("predicts the other 4" in words) == bool(levels)
+    result = tmp_path / "x.json"
+    outputs = ["--png", tmp_path / "x.png", "--json", result]
+    out, err = run(capsys, path, *KOTHERA, "--compare", *outputs, *levels)
+    assert "0 kPa: not in this table, the largest force there is below 1 % of the map" in out
+    assert not {"nan", "inf"} & set(re.findall(r"[a-z]+", out.lower()))
+    assert ("levels not fitted" in out) == bool(levels)
+    assert err.count("written: ") == 2
     json.loads(result.read_text(encoding="utf-8"))
 
 
@@ -350,7 +225,7 @@ def test_a_level_at_rest_has_a_page_and_pictures(capsys, data, tmp_path, levels)
     rows_of(__file__, "wrong_input_is_one_line"),
 )
 def test_wrong_input_is_one_line_and_nothing_is_written(capsys, table, tmp_path, words, parts):
-    err = refused(capsys, table, "--report", tmp_path / "x.html", *words)
+    err = refused(capsys, table, "--png", tmp_path / "x.png", *words)
     line = err.splitlines()[-1]
     assert line.startswith("pamrs: error: ")
     assert "Traceback" not in err
