@@ -50,7 +50,6 @@ STEPS_OF_A_DIAGNOSIS = (
     "ready",
     "next_experiment",
     "result",
-    "schema",
     "explain",
     "",
     "prove",

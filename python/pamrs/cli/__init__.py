@@ -33,7 +33,6 @@ from pamrs.cli.lift import lift_command
 from pamrs.cli.prove import prove_command
 from pamrs.cli.replay import replay_command
 from pamrs.cli.rig import rig_app
-from pamrs.cli.schema import schema_command
 from pamrs.cli.simulate import simulate_command
 from pamrs.cli.size import size_command
 from pamrs.cli.studio import studio_command
@@ -73,7 +72,6 @@ app.command("library")(library_command)
 app.command("lift")(lift_command)
 app.command("prove")(prove_command)
 app.command("replay")(replay_command)
-app.command("schema")(schema_command)
 app.command("size")(size_command)
 app.command("studio")(studio_command)
 app.command("compare")(compare_command)

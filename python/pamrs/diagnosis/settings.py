@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from pamrs._checks import checked_table
-from pamrs.declared import told
 from pamrs.errors import ParameterError
 
 __all__ = ["DiagnosisSettings"]
@@ -25,7 +24,7 @@ def _setting(
     default: float, unit: str, reason: str, origin: str, least: float = 0.0, most: float = math.inf
 ) -> Any:
     """One setting: default, SI unit (``count``: a whole number), why, from where, its range."""
-    meta = told(reason, unit=unit, origin=origin, least=least, most=most, required=False)
+    meta = {"about": reason, "unit": unit, "origin": origin, "least": least, "most": most}
     return dataclasses.field(default=default, metadata=meta)
 
 
