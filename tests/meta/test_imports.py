@@ -149,6 +149,37 @@ def test_no_modules_import_each_other():
         pytest.fail(f"a cycle of imports: {' <- '.join(error.args[1])}")
 
 
+#: Functions that load a module whose name is a value, which the graph of imports does not see.
+LOADERS = {"import_module", "__import__", "exec_module"}
+
+
+def loaded_by_name(path: Path) -> list[str]:
+    """How each name of a module begins that a file loads as a value; empty of one not known."""
+    calls = [n for n in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(n, ast.Call)]
+    found = []
+    for call in calls:
+        if {getattr(call.func, "attr", ""), getattr(call.func, "id", "")} & LOADERS:
+            first = call.args[0]
+            first = first.values[0] if isinstance(first, ast.JoinedStr) else first
+            found.append(str(first.value) if isinstance(first, ast.Constant) else "")
+    return found
+
+
+def test_no_module_of_ours_is_loaded_by_its_name_from_outside_its_package():
+    """The root alone loads everything on first use; a package loads so what is inside it."""
+    home = ROOT / "python"
+    files = [path.relative_to(home) for path in sorted((home / "pamrs").rglob("*.py"))]
+    found = [(path, name) for path in files for name in loaded_by_name(home / path)]
+    assert len(found) > 3
+    assert not [
+        (path, name)
+        for path, name in found
+        if path.parent.name != "pamrs"
+        and not name.startswith(".".join(path.parent.parts) + ".")
+        and (not name or name.startswith("pamrs"))
+    ]
+
+
 def test_only_the_core_and_the_version_come_from_the_root():
     modules = graph().modules
     for importer in sorted(graph().find_modules_that_directly_import("pamrs")):
