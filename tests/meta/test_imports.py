@@ -155,10 +155,11 @@ LOADERS = {"import_module", "__import__", "exec_module"}
 
 def loaded_by_name(path: Path) -> list[str]:
     """How each name of a module begins that a file loads as a value; empty of one not known."""
-    calls = [n for n in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(n, ast.Call)]
+    text = path.read_text(encoding="utf-8")
     found = []
-    for call in calls:
-        if {getattr(call.func, "attr", ""), getattr(call.func, "id", "")} & LOADERS:
+    for call in ast.walk(ast.parse(text)) if any(name in text for name in LOADERS) else ():
+        named = {getattr(getattr(call, "func", None), key, "") for key in ("attr", "id")}
+        if isinstance(call, ast.Call) and named & LOADERS:
             first = call.args[0]
             first = first.values[0] if isinstance(first, ast.JoinedStr) else first
             found.append(str(first.value) if isinstance(first, ast.Constant) else "")
