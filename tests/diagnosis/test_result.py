@@ -169,6 +169,14 @@ def test_headline_badge_page_and_json_say_the_same(
     assert json.loads(found.to_json())["verdict"] == found.verdict
 
 
+def test_it_is_settled_from_the_probability_that_the_settings_say() -> None:
+    found = _judged("unlisted", {"unlisted": 0.7, "muscle_creep": 0.3})
+    bold = dataclasses.replace(found, settings=pamrs.DiagnosisSettings(settled=0.65))
+    assert words.is_open(found)
+    assert not words.is_open(bold)
+    assert "no effect of the catalogue explains (0.70)" in bold.headline
+
+
 def test_notebook_html_escapes() -> None:
     html = synthetic.diagnosis(where={"text": "<script>"})._repr_html_()
     assert "<script>" not in html

@@ -162,6 +162,11 @@ class Diagnosis(View, Findings):
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     @property
+    def settled(self) -> float:
+        """Probability from which its answers are settled, as its settings have it."""
+        return self.settings.settled
+
+    @property
     def headline(self) -> str:
         """The verdict in one sentence."""
         return story.headline(self)

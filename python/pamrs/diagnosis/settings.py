@@ -14,6 +14,7 @@ from typing import Any
 
 from pamrs._checks import checked_table
 from pamrs.errors import ParameterError
+from pamrs.findings import SETTLED
 
 __all__ = ["DiagnosisSettings"]
 
@@ -275,7 +276,7 @@ class DiagnosisSettings:
     )
     # from probabilities to a verdict
     settled: float = _setting(
-        0.75,
+        SETTLED,
         "1",
         "probability from which an answer is settled",
         "docs/decisions/0014: odds of three to one",

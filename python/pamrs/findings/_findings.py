@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 from pamrs.findings._details import (
     BlockResidual,
@@ -31,6 +32,9 @@ from pamrs.findings._entries import (
 )
 from pamrs.findings._entry import NOT_WRITTEN
 from pamrs.findings._trace import ModelFile, Trace
+
+SETTLED: Final = 0.75
+"""Probability from which an answer is settled, where no setting says another one."""
 
 
 def channels_off(runs: Sequence[FreeRun]) -> dict[str, FreeRunError]:
@@ -162,6 +166,11 @@ class Findings:
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
             raise ValueError(f"verdict is {self.verdict!r}; allowed are {', '.join(VERDICTS)}")
+
+    @property
+    def settled(self) -> float:
+        """Probability from which an answer is settled."""
+        return SETTLED
 
     @property
     def off(self) -> dict[str, FreeRunError]:
