@@ -106,7 +106,7 @@ def test_an_instruction_that_pairs_share_is_given_once() -> None:
         PairExperiment(zero, "Measure it by itself with a gauge."),
     ]
     own = NextExperiment(f"{what}; what fades is heat.", pairs=pairs)
-    found = dataclasses.replace(synthetic.diagnosis(), next_experiment=own)
+    found = dataclasses.replace(synthetic.diagnosis(traces=[]), next_experiment=own)
     summary = " ".join(found.summary().split())
     assert summary.count("watch for 4 s") == 1
     same = "effect outside the catalogue or muscle leak? The same experiment. A model with a leak"

@@ -148,7 +148,7 @@ def test_kgf_labelled_bar_is_told_beside_a_gain() -> None:
 @pytest.mark.parametrize(
     ("gains", "told"),
     [
-        ({}, False),
+        pytest.param({}, False, marks=pytest.mark.slow),
         ({"supply_pressure": 1.03}, False),
         pytest.param({"supply_pressure": 0.99}, False, marks=pytest.mark.slow),
         pytest.param({"muscle_pressure": 1.01}, False, marks=pytest.mark.slow),
