@@ -44,6 +44,8 @@ ifeq ($(shell grep -m 1 '^flags' /proc/cpuinfo 2>/dev/null | tr ' ' '\n' | grep 
 export RUSTFLAGS ?= -C target-cpu=x86-64-v3
 endif
 export MPLBACKEND := Agg
+# Compiled modules are kept, whatever the shell says: tests of the command line start Python anew.
+export PYTHONDONTWRITEBYTECODE :=
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \

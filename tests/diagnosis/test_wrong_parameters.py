@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
-import jsonschema
 import numpy as np
 import pytest
 
 import pamrs
 from pamrs.diagnosis.evidence import Attempts, Candidate
 from pamrs.diagnosis.fit import Problem, fit
-from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
 from pamrs.diagnosis.search import suspected_values
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, _needless
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.diagnosis.asked import ROLES, SETTINGS, diagnosed, problem_of
+from tests.diagnosis.kept import kept
 from tests.diagnosis.noisy import SHOULDER, driven
 
 RIG = pamrs.rigs.shoulder()
@@ -74,7 +72,7 @@ def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor
     assert share > 0.85
     assert name.replace(".", " ").replace("_", " ") in found.headline
     assert found.text.startswith("The rig file is wrong")
-    jsonschema.validate(json.loads(found.to_json()), schema())
+    kept(found)
 
 
 def test_a_value_inside_its_tolerance_is_not_called_wrong() -> None:

@@ -29,7 +29,6 @@ from pamrs.cli.fit import fit_app
 from pamrs.cli.import_logs import import_command
 from pamrs.cli.replay import replay_command
 from pamrs.cli.rig import rig_app
-from pamrs.cli.schema import schema_command
 from pamrs.cli.simulate import simulate_command
 from pamrs.cli.size import size_command
 from pamrs.cli.studio import studio_command
@@ -66,7 +65,6 @@ app.command("effects")(effects_command)
 app.command("example")(example_command)
 app.command("import")(import_command)
 app.command("replay")(replay_command)
-app.command("schema")(schema_command)
 app.command("size")(size_command)
 app.command("studio")(studio_command)
 app.command("compare")(compare_command)

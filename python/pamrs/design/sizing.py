@@ -35,7 +35,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_LEAST_PRESSURE: Final = 2e3  # [Pa], below which a working pressure is a mistake of unit
+_LEAST_WORKING_PRESSURE: Final = 2e3  # [Pa], below which a working pressure is a mistake of unit
 _RULES: Final[dict[str, tuple[str, bool]]] = {  # criterion: (key, larger is better)
     "count": ("count", False),
     "mass": ("mass", False),
@@ -388,7 +388,7 @@ def size(
             reason = str(error)
         if reason:
             hint = ""
-            if candidate.pressure < _LEAST_PRESSURE:
+            if candidate.pressure < _LEAST_WORKING_PRESSURE:
                 hint = f" (its pressure is {candidate.pressure:g} Pa: were bar meant?)"
             infeasible[candidate.name] = reason + hint
     return SizingResult(rows, infeasible)

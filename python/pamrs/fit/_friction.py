@@ -47,7 +47,7 @@ _OF_A_LEVEL: Final = (
     *("pressure", "coefficient", "stderr", "law", "at_floor", "rows"),
     *("contraction", "force", "half_width"),
 )
-_TOLD: Final = (
+_OF_A_FIT: Final = (
     *("parameters", "floor", "presliding", "presliding_reason", "levels", "residual", "ndata"),
     *("nvarys", "nfree", "redchi", "between", "covar", "slope_pvalue", "slope_significant"),
     *("isometric", "issues"),
@@ -281,7 +281,7 @@ class FrictionFit(View):
             for level, law in zip(self.levels, self.best_fit.tolist(), strict=True)
         ]
         own = {"parameters": [asdict(item) for item in self.params.values()], "levels": levels}
-        plain = {key: own[key] if key in own else getattr(self, key) for key in _TOLD}
+        plain = {key: own[key] if key in own else getattr(self, key) for key in _OF_A_FIT}
         found: dict[str, Any] = to_plain(plain)
         return found
 

@@ -41,7 +41,7 @@ _STRAIN_SHARE = 0.5  # share of the priors' sum of squares that counts (decision
 _TELLING_EXCESS = 0.5
 _TELLING_SHARE = 0.9  # share of the largest excess from which recordings always are
 # share left of hardly a mismatch by what explains it: it has to take 30 % (decision 20)
-_CLEAR_SHARE = 0.7
+_EXPLAINED_SHARE = 0.7
 # share of a mismatch by which forms that leave as much differ (decision 20)
 FORM_SHARE_ALIKE = 0.01
 # log odds: an effect like another, as a parameter is near zero; 7 to 1 (decision 20)
@@ -267,7 +267,7 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
         significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out)
     )
     before, after = max(_excesses(candidate, baseline, suspects))
-    return quiet and after < _CLEAR_SHARE * before
+    return quiet and after < _EXPLAINED_SHARE * before
 
 
 def is_absent(candidate: Candidate, walls: float) -> bool:

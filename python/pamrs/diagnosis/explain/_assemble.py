@@ -70,7 +70,7 @@ from pamrs.rig import Rig
 # [noise levels] gap of refit to noise below which nothing is said of how much closes
 _LEAST_GAP = 0.05
 # [tolerances] standard deviation below which a parameter counts as determined by the recordings
-_KNOWN_SHARE = 0.7
+_DETERMINED_SHARE = 0.7
 
 
 Array = NDArray[np.float64]
@@ -498,7 +498,7 @@ def _parameters(
             std=own.std[name],
             unit=p.unit,
             moved_sigmas=(own.values[name] - p.value) / p.tol,
-            identifiable=own.std[name] < _KNOWN_SHARE * p.tol,
+            identifiable=own.std[name] < _DETERMINED_SHARE * p.tol,
         )
     return out
 
