@@ -6,7 +6,8 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 (recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible`, `without_dead_commands`, `without_impossible`,
 `without_rails`,
-`suspected_units` (what recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`,
+`suspected_units` (what recordings cannot be), `uncommanded`, `unusable` (which cannot be used),
+`prepare`, `Prepared`, `binned`, `noise_level`,
 `smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`,
 `available_blocks`, `Unjudged`, `unjudged_blocks` (blocks that the channels do not tell), `begun`,
 `change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
@@ -44,11 +45,12 @@ from pamrs.diagnosis.prepare._rails import without_rails
 from pamrs.diagnosis.prepare._signals import (
     Prepared,
     binned,
-    check_commands,
     noise_level,
     prepare,
     smoothed,
     thermometers_of,
+    uncommanded,
+    unusable,
     warm_chambers,
 )
 from pamrs.diagnosis.prepare._thermometers import without_poor_thermometers
@@ -77,7 +79,6 @@ __all__ = [
     "binned",
     "blocks_beside_tanks",
     "change",
-    "check_commands",
     "check_plausible",
     "check_sense",
     "implausible",
@@ -95,7 +96,9 @@ __all__ = [
     "suspected_units",
     "thermometers_of",
     "unjudged_blocks",
+    "uncommanded",
     "unread_tanks",
+    "unusable",
     "varying",
     "warm_chambers",
     "without_copies",
