@@ -43,6 +43,7 @@ from pamrs.diagnosis.prepare import (
     prepare,
     said_of_beginnings,
     said_of_own,
+    said_of_slack,
     said_of_tanks,
     unjudged_blocks,
     unread_tanks,
@@ -309,6 +310,10 @@ def _physics(
     parts = [[b for b in inner.blocks if not b.mechanical], motion]
     groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
     inner, outer = _judged_only(inner, outer, groups)
+    missed = [b for group in groups if group.mismatch is not None for b in group.blocks]
+    slack = inner.losses.part(
+        "the look at slack muscles", lambda: said_of_slack(case.rig, missed, inner.recordings), []
+    )
     unsettled = _unsettled(case.rig) if motion else []
     if unsettled:
         groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
@@ -330,6 +335,7 @@ def _physics(
         NextExperiment(""),
     )
     diagnosis = assemble(case, inner, outer, groups, found, proposal, unjudged)
+    diagnosis = replace(diagnosis, warnings=[*slack, *diagnosis.warnings])
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         told = (

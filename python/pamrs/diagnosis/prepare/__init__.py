@@ -13,7 +13,8 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 `change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
 (beginnings that nobody measured), `blocks_beside_tanks`, `unread_tanks`, `with_tanks`,
 `said_of_tanks` (tanks without a gauge, which are simulated), `own_of_rig`, `varying`,
-`with_own_values`, `said_of_own` (values that are free in each recording).
+`with_own_values`, `said_of_own` (values that are free in each recording), `said_of_slack` (muscles
+that do not push back).
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ from pamrs.diagnosis.prepare._signals import (
     unusable,
     warm_chambers,
 )
+from pamrs.diagnosis.prepare._slack import said_of_slack
 from pamrs.diagnosis.prepare._thermometers import without_poor_thermometers
 from pamrs.diagnosis.prepare._units import noted_units, suspected_units
 from pamrs.diagnosis.prepare._unread import (
@@ -91,6 +93,7 @@ __all__ = [
     "residual",
     "said_of_beginnings",
     "said_of_own",
+    "said_of_slack",
     "said_of_tanks",
     "smoothed",
     "suspected_units",
