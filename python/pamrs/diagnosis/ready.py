@@ -108,10 +108,11 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
     suspected = [*left, *odd, *empty, *suspected]
     blocks = blocks_beside_tanks(case.rig, case.channels)
     if not blocks:
-        raise DiagnosisError(
+        told = (
             f"case {case.name!r}: its channels ({', '.join(case.channels)}) do not surround any "
             f"block of the rig ({', '.join(case.rig.blocks)}); measure {_wanted(case.rig)}"
         )
+        raise DiagnosisError("\n".join([told, *left, *odd, *empty]))
     return Ready(case, blocks, suspected, [*copies, *held], masked, [*dead, *clipped])
 
 
