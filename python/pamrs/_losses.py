@@ -95,7 +95,10 @@ class Losses:
 
     def add(self, what: str, error: BaseException) -> None:
         """Tell of something that failed."""
-        text = f"{what} failed and was left out ({reason(error)}); please report it"
+        self.tell(f"{what} failed and was left out ({reason(error)}); please report it")
+
+    def tell(self, text: str) -> None:
+        """Tell a sentence, once."""
         with self._lock:
             if text not in self.told:
                 self.told.append(text)

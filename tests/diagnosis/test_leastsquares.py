@@ -63,6 +63,17 @@ def test_a_start_that_cannot_be_simulated_is_an_error() -> None:
         levenberg_marquardt(evaluate, np.zeros(1), box([-1.0], [1.0]), 5)
 
 
+@pytest.mark.parametrize("size", [1e120, 1e153, 1e200])
+def test_sensitivities_that_any_damping_would_make_infinite_are_refused(size: float) -> None:
+    """Their squares are finite in the second case, and times a damping they are not."""
+
+    def steep(x: Array) -> tuple[Array, Array, None]:
+        return np.array([size * (x[0] - 1.0)]), np.array([[size]]), None
+
+    with pytest.raises(SimulationError, match="too large to be fitted"):
+        levenberg_marquardt(steep, np.zeros(1), box([-5.0], [5.0]), 20)
+
+
 def test_noise_is_not_worth_an_evaluation() -> None:
     rows = np.random.default_rng(1).standard_normal(1000)
     rows += 0.02 - rows.mean()  # a gain of 0.4 in a chi-square of 1000

@@ -444,14 +444,63 @@ def test_counters_overflow_near_the_end_of_a_log(bits: float, rows: int) -> None
     assert (found.rows == np.arange(400)).all()
 
 
-@pytest.mark.parametrize("rows", [1, 2, 10, 19])
-def test_a_clock_that_begins_again_near_the_end_of_a_log_is_not_sorted(rows: int) -> None:
-    time = 0.005 * np.arange(400.0)
-    for begins in (0.0, 0.3021):
-        found = ticks(np.concatenate([time, begins + time[:rows]]))
-        assert (found.rows == np.arange(400 + rows)).all()
-    late = ticks(np.concatenate([np.delete(time, [200, 201]), time[[200, 201]]]))
-    np.testing.assert_array_equal(late.time, time)
+EVEN, GROWING = np.arange(40.0), np.cumsum(0.01 * 1.2 ** np.arange(19))
+RESTARTED = {
+    "ten rows at 1 s, then 240 at 0.5 s": [EVEN[:10], 0.5 * np.arange(240)],
+    "the same from another second": [EVEN[:10] + 3.0, 0.3 + 0.5 * np.arange(240)],
+    "five pairs of them": [EVEN[:10], 0.5 * np.arange(240)] * 5,
+    "42 parts whose steps grow": [GROWING] * 42,
+    "42 parts, each faster than the last": [GROWING * 0.97**k for k in range(42)],
+    "a start that was given up": [EVEN[:2], EVEN],
+    "two rows before each part": [35.0 * EVEN[:2], EVEN[:18]] * 3,
+    "one row near the end": [0.005 * np.arange(400.0), 0.3021 * np.ones(1)],
+    "rows of another moment near the end": [0.005 * np.arange(400.0), 0.3021 + 0.005 * EVEN[:19]],
+    "the first rows again at the end": [0.005 * np.arange(400.0), 0.005 * EVEN[:10]],
+    "a clock that was set back": [10.0 * EVEN[:3], 15.0 + 10.0 * EVEN],
+}
+
+
+@pytest.mark.parametrize("name", RESTARTED)
+def test_a_clock_that_starts_again_is_a_restart(name: str) -> None:
+    """Ten rows of a leak-down at 1 s, and the log again at 0.5 s, interleaved: one recording of a
+    wrong clock.
+    """
+    parts = RESTARTED[name]
+    found = ticks(np.concatenate(parts))
+    np.testing.assert_array_equal(found.time, np.concatenate(parts))
+    assert found.remarks == ()
+
+
+@pytest.mark.parametrize("parts", [1, 2, 42])
+def test_parts_of_a_log_stay_as_they_were_written(tmp_path: Path, parts: int) -> None:
+    head = ",".join(["time [s]", *HEAD])
+    text = "\n".join([head, *["0,5,1,20", "0.7,5,1,20", *rows(plain)[:18]] * parts])
+    found = loaded(tmp_path, text, split="clock")
+    assert [len(each) for each in found] == [2, 18] * parts
+    (whole,) = loaded(tmp_path, text)
+    assert any("split = 'clock' in case.toml" in issue.text for issue in whole.issues)
+
+
+LATE = {
+    "one": [0, 1, 2, 4, 3, 5, 6],
+    "the first": [1, 0, 2, 3, 4],
+    "each second": [1, 0, 3, 2, 5, 4, 7, 6],
+    "a packet": [0, 1, 2, 6, 7, 3, 4, 5, 8, 9],
+    "a packet, the last first": [0, 1, 2, 6, 5, 4, 3, 7, 8],
+    "two writers": [0, 2, 4, 6, 8, 1, 3, 5, 7, 9, 10, 11, 12],
+    "at the end": [*range(200), *range(202, 400), 200, 201],
+    "the last but one": [0, 1, 2, 4, 3],
+}
+
+
+@pytest.mark.parametrize("name", LATE)
+@pytest.mark.parametrize("jitter", [0.0, 0.1])
+def test_rows_that_came_late_are_sorted(name: str, jitter: float) -> None:
+    order = np.array(LATE[name])
+    time = np.sort(order + np.random.default_rng(3).uniform(-jitter, jitter, len(order)))
+    found = ticks(time[order])
+    np.testing.assert_array_equal(found.time, time)
+    assert "rows that come after later ones" in found.remarks[0]
 
 
 CHANNELS = {

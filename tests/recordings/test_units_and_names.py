@@ -23,6 +23,7 @@ from pamrs.recordings import (
     load_recording,
     propose,
 )
+from pamrs.recordings.logs import read_log
 from pamrs.rig import load_rig
 from tests.recordings.written import SHOULDER, case_of, write_json_messages, write_table
 from tests.tables import rows_of
@@ -323,3 +324,31 @@ def test_a_fluid_pressure_is_absolute_and_its_variance_no_channel(tmp_path: Path
     found, only = pressure(tmp_path, propose([file], SHOULDER))
     np.testing.assert_allclose(found, GAUGE, atol=0.1)
     assert "is subtracted" in only.notes["muscle_pressure"]
+
+
+@pytest.mark.parametrize(
+    ("heading", "names"),
+    [
+        ("Piezo_P_(mA)", ("Piezo_P", "Piezo_P_", "Piezo_P_(mA)", "Piezo_P (mA)")),
+        ("p_{bar}", ("p", "p_", "p_{bar}", "p [bar]")),
+        ("Druck <mbar>", ("Druck", "Druck <mbar>")),
+        ("stroke (raw)", ("stroke", "stroke (raw)")),
+    ],
+)
+def test_a_heading_with_its_unit_names_its_series(
+    tmp_path: Path, heading: str, names: tuple[str, ...]
+) -> None:
+    """What earlier versions called it in a ``case.toml`` goes on, and what stands in the file."""
+    found = read_log(log(tmp_path, {heading: GAUGE, "angle [deg]": ANGLE}))
+    assert list(found.series) == ["time", names[0], "angle"]
+    assert all(found.find(name) is found.series[names[0]] for name in names)
+
+
+def test_a_number_in_brackets_is_no_unit_and_an_unknown_name_is_told(tmp_path: Path) -> None:
+    twice = log(tmp_path, {"p [bar]": GAUGE, "p (bar)": ANGLE, "p_tank (mA)": GAUGE})
+    found = read_log(twice)
+    np.testing.assert_allclose(found.find("p (2)").values, ANGLE, rtol=1e-6)
+    with pytest.raises(RecordingError, match=r"no channel 'p \(3\)'; did you mean 'p \(2\)'"):
+        found.find("p (3)")
+    with pytest.raises(RecordingError, match="no channel 'p_tnk_'; did you mean 'p_tank'"):
+        found.find("p_tnk_")

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import pamrs
+from pamrs.cli import app
 from pamrs.rig import parse_rig
 
 PAIRS = ("pair_1", "pair_2", "pair_3")
@@ -45,16 +48,39 @@ def test_muscles_of_the_packaged_rigs_are_slack_or_bow_out(name: str) -> None:
     assert told.count("\nbuckling_load") == len(loads)
 
 
+def text_without_key(name: str) -> str:
+    """The file of a packaged rig without what it says of a push."""
+    lines = (resources.files("pamrs.rigs") / f"{name}.toml").read_text(encoding="utf-8")
+    return "\n".join(x for x in lines.splitlines() if not x.startswith("buckling_load"))
+
+
 def without_key(name: str) -> pamrs.Rig:
     """A packaged rig whose file says nothing of a push."""
-    lines = (resources.files("pamrs.rigs") / f"{name}.toml").read_text(encoding="utf-8")
-    kept = [line for line in lines.splitlines() if not line.startswith("buckling_load")]
-    return parse_rig("\n".join(kept))
+    return parse_rig(text_without_key(name))
 
 
 def test_where_nothing_is_said_a_muscle_is_slack() -> None:
     assert without_key("antagonistic_joint").tables("muscle")["flexor"]["buckling_load"] == 0.0
     assert pamrs.library.entry("pam_a_1in").muscle.parameters["buckling_load"] == 0.0
+
+
+def test_a_file_that_says_nothing_of_a_push_is_told(tmp_path: Path) -> None:
+    """It may be of the time when muscles pushed, and lag where they are slack now."""
+    told = [c for c in without_key("antagonistic_joint").cautions if "slack without air" in c]
+    assert [c.partition(" is ")[0] for c in told] == ["muscle.flexor", "muscle.extensor"]
+    assert all("lags where the muscle is slack" in caution for caution in told)
+    (caution,) = without_key("hanging_mass").cautions
+    muscle = pamrs.Muscle.from_model(pamrs.rigs.hanging_mass().tables("muscle")[""])
+    push = -float(muscle.force(0.0, 1.0 - np.linspace(0.18, 0.276, 500) / 0.276).min())
+    said = float(caution.partition("by up to ")[2].partition(" N")[0])
+    assert said == pytest.approx(push, rel=0.01)
+    assert without_key("bench").cautions == []  # its length is held
+    file = tmp_path / "rig.toml"
+    file.write_text(without_key("hanging_mass").to_toml_text(comments=False), encoding="utf-8")
+    assert not pamrs.load_rig(file).cautions  # what was made says what it has
+    file.write_text(text_without_key("hanging_mass"), encoding="utf-8")
+    found = CliRunner().invoke(app, ["rig", "check", str(file)])
+    assert f"warning: {caution}" in found.output
 
 
 def against_a_vented_extensor(rig: pamrs.Rig) -> pamrs.Simulation:

@@ -27,7 +27,7 @@ from pamrs._progress import Steps
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.evidence import BlockGroup
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
-from pamrs.diagnosis.fit import Problem, fits, with_offsets
+from pamrs.diagnosis.fit import Problem, Unfollowed, fits, with_offsets
 from pamrs.diagnosis.model import conclude
 from pamrs.diagnosis.next_experiment import next_to_record
 from pamrs.diagnosis.noise import noise_levels
@@ -42,13 +42,14 @@ from pamrs.diagnosis.prepare import (
     prepare,
     said_of_beginnings,
     said_of_own,
+    said_of_slack,
     said_of_tanks,
     unjudged_blocks,
     unread_tanks,
     with_own_values,
     with_tanks,
 )
-from pamrs.diagnosis.ready import readied
+from pamrs.diagnosis.ready import Ready, left_out, readied
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine, find_misread, reading_errors
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -217,42 +218,65 @@ def diagnose(
         case = case.with_rig(rig) if isinstance(rig, Rig) else case.with_rig(load_rig(rig), rig)
     chosen = DiagnosisSettings() if settings is None else settings
     ready = readied(case, chosen)
-    case, seen = ready.case, ready.blocks
-    shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen)
-    case = replace(case, recordings=shortened)
-    say(f"{case.name}: preparing {len(case.recordings)} recordings", _JUDGED[0] / 2)
-    inner, outer, unjudged, begun = _problems(case, chosen, _asked(case.rig, consider))
+    case = ready.case
+    asked = _asked(case.rig, consider)
     with _in_range(case.name):
-        part, moved = partial(inner.losses.part, through=(PamrsError,)), list[str]()
-        read = part("the search for other units", lambda: find_misread(inner, case.rig))
-        if read is not None:
-            errors = {"fit": reading_errors(case.rig, inner, read), "held_out": {}}
-            if outer is not inner:
-                errors["held_out"] = reading_errors(case.rig, outer, read)
-            diagnosis = misread_diagnosis(case, inner, read, unjudged, errors)
-        else:
-            laid = part(
-                "the search for offsets of commands", lambda: _on_time(inner, outer, case.rig)
-            )
-            inner, outer, moved = laid or (inner, outer, [])
-            diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
-    # the first few are all that a terminal shows: first what may make the answer wrong
-    warnings = [*inner.losses.told, *ready.suspected, *ready.told, *diagnosis.warnings]
-    warnings += [*ready.masked, *begun, *moved]
+        diagnosis, ready = _answered(ready, chosen, asked, say)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     say(f"{case.name}: done", 1.0)
-    data = data_used(
-        _as_found(case, inner, outer), counts, inner.blocks, case.rig, inner.core, unjudged
-    )
     return replace(
         diagnosis,
         faulty=ready.faulty,
-        warnings=warnings,
-        data=data,
         inputs=dict(case.inputs),
         seconds=round(time.perf_counter() - began, 3),
     )
+
+
+def _answered(
+    ready: Ready, settings: DiagnosisSettings, asked: tuple[Hypothesis, ...], say: Steps
+) -> tuple[Diagnosis, Ready]:
+    """The diagnosis of a case without recordings that its model cannot follow, each of them named;
+    and that case.
+    """
+    try:
+        return _answer(ready, settings, asked, say), ready
+    except Unfollowed as error:
+        lost = error
+    why = f"the model cannot follow it ({lost})"
+    case, said = left_out(ready.case, lambda r: why * (r.name == lost.recording))
+    if not said:
+        raise lost
+    there = replace(ready, case=case, suspected=[*said, *ready.suspected])
+    return _answered(there, settings, asked, say)
+
+
+def _answer(
+    ready: Ready, settings: DiagnosisSettings, asked: tuple[Hypothesis, ...], say: Steps
+) -> Diagnosis:
+    """The diagnosis of a case that was looked at."""
+    case = ready.case
+    shortened, counts = averaged_to_need(case.recordings, ready.blocks, case.name, settings)
+    case = replace(case, recordings=shortened)
+    say(f"{case.name}: preparing {len(case.recordings)} recordings", _JUDGED[0] / 2)
+    inner, outer, unjudged, begun = _problems(case, settings, asked)
+    part, moved = partial(inner.losses.part, through=(PamrsError,)), list[str]()
+    read = part("the search for other units", lambda: find_misread(inner, case.rig))
+    if read is not None:
+        errors = {"fit": reading_errors(case.rig, inner, read), "held_out": {}}
+        if outer is not inner:
+            errors["held_out"] = reading_errors(case.rig, outer, read)
+        diagnosis = misread_diagnosis(case, inner, read, unjudged, errors)
+    else:
+        laid = part("the search for offsets of commands", lambda: _on_time(inner, outer, case.rig))
+        inner, outer, moved = laid or (inner, outer, [])
+        diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
+    # the first few are all that a terminal shows: first what may make the answer wrong
+    warnings = [*inner.losses.told, *ready.suspected, *ready.told, *diagnosis.warnings]
+    warnings += [*ready.masked, *begun, *moved]
+    found = _as_found(case, inner, outer)
+    data = data_used(found, counts, inner.blocks, case.rig, inner.core, unjudged)
+    return replace(diagnosis, warnings=warnings, data=data)
 
 
 def _case_of(case: Any, data: Any, *, allow_outside: bool) -> Case:
@@ -285,6 +309,10 @@ def _physics(
     parts = [[b for b in inner.blocks if not b.mechanical], motion]
     groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
     inner, outer = _judged_only(inner, outer, groups)
+    missed = [b for group in groups if group.mismatch is not None for b in group.blocks]
+    slack = inner.losses.part(
+        "the look at slack muscles", lambda: said_of_slack(case.rig, missed, inner.recordings), []
+    )
     unsettled = _unsettled(case.rig) if motion else []
     if unsettled:
         groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
@@ -306,6 +334,7 @@ def _physics(
         NextExperiment(""),
     )
     diagnosis = assemble(case, inner, outer, groups, found, proposal, unjudged)
+    diagnosis = replace(diagnosis, warnings=[*slack, *diagnosis.warnings])
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         told = (
@@ -419,8 +448,7 @@ def _problems(
             + "".join(f"; {told}" for told in begun)
         )
     inner = Problem(blocks, fitted, core, settings, considered=asked)
-    with _in_range(case.name):
-        drowned = _drowned(inner, rig)
+    drowned = _drowned(inner, rig)
     left_out = [b for b in every if b.name in thin or b.name in drowned]
     inner = replace(inner, blocks=[b for b in blocks if b.name not in drowned])
     if not inner.blocks:

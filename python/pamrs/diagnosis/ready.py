@@ -4,7 +4,7 @@ impossible samples, copies, and the blocks that what was recorded surrounds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,11 +14,13 @@ from pamrs.diagnosis.prepare import (
     Block,
     at_ambient,
     blocks_beside_tanks,
-    check_commands,
     check_plausible,
+    implausible,
     noted_units,
     own_of_rig,
     suspected_units,
+    uncommanded,
+    unusable,
     varying,
     without_copies,
     without_dead_commands,
@@ -30,12 +32,12 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError
 from pamrs.findings import Faulty
-from pamrs.recordings import Case
+from pamrs.recordings import Case, Recording
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig
 
-__all__ = ["Ready", "readied"]
+__all__ = ["Ready", "left_out", "readied"]
 
 
 @dataclass(frozen=True)
@@ -92,19 +94,50 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
         case, held = _nominal(case, settings)
         alive, dead = without_dead_commands(case.recordings, case.rig)
         case = replace(case, recordings=alive)
+        core = core_rig(case.rig)
+        case, left = left_out(case, lambda r: uncommanded(r, case.rig, core.inputs))
+        case, odd = left_out(case, lambda r: "; ".join(implausible(r, case.rig, settings)))
         for recording in case.recordings:
-            check_commands(recording, case.rig, core_rig(case.rig).inputs)
+            if why := uncommanded(recording, case.rig, core.inputs):
+                raise DiagnosisError(f"recording {recording.name!r}: {why}")
         check_plausible(case.recordings, case.rig, case.name, settings)
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *suspected])) from error
     case, clipped, copies, masked = _sound(case, settings)
+    case, empty = left_out(case, lambda r: unusable(r, case.rig, core, settings))
+    suspected = [*left, *odd, *empty, *suspected]
     blocks = blocks_beside_tanks(case.rig, case.channels)
     if not blocks:
-        raise DiagnosisError(
+        told = (
             f"case {case.name!r}: its channels ({', '.join(case.channels)}) do not surround any "
             f"block of the rig ({', '.join(case.rig.blocks)}); measure {_wanted(case.rig)}"
         )
+        raise DiagnosisError("\n".join([told, *left, *odd, *empty]))
     return Ready(case, blocks, suspected, [*copies, *held], masked, [*dead, *clipped])
+
+
+def left_out(case: Case, fault: Callable[[Recording], str]) -> tuple[Case, list[str]]:
+    """The case without recordings that cannot be used, which would hold up the others.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    fault : callable
+        Why a recording cannot be used, in words; empty where it can.
+
+    Returns
+    -------
+    case : Case
+        With all recordings where none to be fitted would be left.
+    said : list of str
+        A sentence for each recording that is left out.
+    """
+    faults = {r.name: why for r in case.recordings if (why := fault(r))}
+    kept = replace(case, recordings=[r for r in case.recordings if r.name not in faults])
+    if not faults or not (kept.fit if case.fit else kept.recordings):
+        return case, []
+    return kept, [f"recording {name!r} is left out: {why}" for name, why in faults.items()]
 
 
 def _check_rig(case: Case) -> None:

@@ -199,6 +199,8 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
         text = (
             f"the clock steps {way} by {abs(float(intervals[index])):.6g} s; what follows is "
             f"placed after {_JUMP_HOLE} empty samples, because the true pause is not known"
+            + " (split = 'clock' in case.toml makes it a recording of its own)"
+            * (way == "back")
         )
         events.append(_between(placed, index, index, text, "clock_jump"))
     if len(steps) > _MOST_EVENTS:

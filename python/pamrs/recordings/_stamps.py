@@ -48,7 +48,7 @@ _OFTEN: Final = 3
 _LATE: Final = 20  # rows that may come late, one after the other
 _MANY: Final = 50  # stamps between pauses from which on a line through their rows is known
 _NEWEST_FIRST: Final = 0.02  # steps forward for each one back, of logs with the newest row first
-_CROWDED: Final = 1.5  # usual density of rows; what is denser are two recordings, not one
+_LEAST_STEP: Final = 0.05  # usual steps; rows that are nearer to each other are as good as at once
 _SAME: Final = 3.0  # how far beyond the largest step of an angle one over a full turn may be
 
 
@@ -202,47 +202,45 @@ def _in_order(time: Array) -> tuple[Rows, int]:
     starts again, it stays so.
     """
     order: Rows = np.arange(len(time))
-    steps = np.diff(time)
-    backs = np.flatnonzero(steps < 0.0)
-    if not len(backs) or not np.any(steps > 0.0):
-        return order, 0
-    usual = float(np.median(steps[steps > 0.0]))
     laid = time.copy()
     start, done, moved = 0, 0, 0
-    for at in backs.tolist():
-        if at + 1 < done:
+    for at in np.flatnonzero(np.diff(time) < 0.0).tolist():
+        late = at + 1
+        if late < done:
             continue
-        after = laid[at + 1 : at + 2 + _LATE]
+        after = laid[late : late + 1 + _LATE]
         ahead = np.flatnonzero(after >= laid[at])
-        if len(ahead):
-            stop = at + 1 + int(ahead[0])
-        else:
-            ends = at + 1 + _LATE >= len(laid)
-            fits = ends and _has_room(laid[start:], at + 1 - start, usual)
-            stop = len(laid) if fits else 0
-        low = float(laid[at + 1 : stop].min()) if stop else 0.0
-        first = start + int(np.searchsorted(laid[start : at + 1], low))
-        span = float(laid[at]) - low
-        if stop and (stop - 1 - first) * usual <= _CROWDED * span:
+        stop = late + int(ahead[0] if len(ahead) else len(after))
+        first = start + int(np.searchsorted(laid[start:late], laid[late:stop].min()))
+        low, next_ones = max(start, first - 2), laid[stop : stop + 2]
+        near = np.append(laid[low:stop], np.sort(next_ones[next_ones >= laid[at]]))
+        followed = len(ahead) > 0 or stop == len(laid)
+        if followed and _came_late(near, first - low, stop - low):
             local = first + np.argsort(laid[first:stop], kind="stable")
-            moved += stop - at - 1
+            moved += stop - late
             order[first:stop] = order[local]
             laid[first:stop] = laid[local]
             done = stop
         else:
-            start = done = at + 1
+            start = done = late
     return order, moved
 
 
-def _has_room(laid: Array, count: int, usual: float) -> bool:
-    """Whether the rows before leave room for the last ones, from `count` on: a run that began again
-    at the end of a log lies where the first one has rows.
+def _came_late(written: Array, first: int, stop: int) -> bool:
+    """Whether rows up to `stop` fill what those from `first` on left open: the steps of one clock
+    are more even in order, those of a clock that started again as they were written.
     """
-    before, late = laid[:count], np.sort(laid[count:])
-    first = int(np.searchsorted(before, late[0]))
-    last = int(np.searchsorted(before, late[-1], side="right"))
-    low = before[first - 1] if first else late[0] - usual
-    return bool((last - first + len(late) + 1) * usual < _CROWDED * (before[last] - low))
+    merged = written.copy()
+    merged[first:stop].sort()
+    steps = np.diff(merged)
+    least = _LEAST_STEP * float(np.median(steps[steps > 0.0]))
+
+    def roughness(time: Array) -> float:
+        steps = np.diff(time)
+        turns = np.diff(np.log(np.maximum(steps, least)))
+        return float(np.sum(turns[(steps[1:] >= 0.0) & (steps[:-1] >= 0.0)] ** 2))
+
+    return roughness(merged) < roughness(written)
 
 
 def spread(time: Array) -> tuple[Array, str]:

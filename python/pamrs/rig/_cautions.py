@@ -5,6 +5,7 @@ friction of nothing, values that are known exactly.
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
@@ -46,7 +47,7 @@ _STIFFEST: Final = 5e6  # modulus of the stiffest rubber that bladders are made 
 
 
 def cautions_of(
-    model: Mapping[str, Any], ports: Ports, parameters: Mapping[str, Parameter]
+    model: Mapping[str, Any], ports: Ports, parameters: Mapping[str, Parameter], text: str = ""
 ) -> list[str]:
     """What of a model is possible, and most likely a mistake.
 
@@ -58,6 +59,8 @@ def cautions_of(
         What its blocks are connected to.
     parameters : mapping of str to Parameter
         Its parameters by dotted name.
+    text : str
+        The file, as its author wrote it; empty where there is none.
 
     Returns
     -------
@@ -71,7 +74,7 @@ def cautions_of(
         found += _late(label, valve)
     for name, muscle in tables_of(model, "muscle").items():
         found += _strut(qualified("muscle", name), muscle)
-    found += [*_limitless(model), *_strokes(model, ports)]
+    found += [*_limitless(model), *_strokes(model, ports), *_slack(model, ports, text)]
     return [*found, *_frictionless(parameters), *_exact(parameters)]
 
 
@@ -253,9 +256,7 @@ def _shut(label: str, valve: Mapping[str, Any]) -> list[str]:
 
 def _strut(label: str, muscle: Mapping[str, Any]) -> list[str]:
     """A muscle that pushes more than a rod of rubber as thick as it can bear, held at both ends."""
-    load, length = muscle["buckling_load"], muscle["rest_length"]
-    bent = math.pi / 64.0 * muscle["rest_diameter"] ** 4
-    most = 4.0 * math.pi**2 * _STIFFEST * bent / length**2
+    load, most = muscle["buckling_load"], _borne(muscle)
     if load <= most:
         return []
     return [
@@ -263,6 +264,56 @@ def _strut(label: str, muscle: Mapping[str, Any]) -> list[str]:
         f"of rubber as thick and long bows out at {most:.2g} N, a muscle before; 0 N for one that "
         "goes slack"
     ]
+
+
+def _borne(muscle: Mapping[str, Any]) -> float:
+    """The push at which a rod of rubber as thick and long bows out, held at both ends [N]."""
+    bent = math.pi / 64.0 * muscle["rest_diameter"] ** 4
+    return float(4.0 * math.pi**2 * _STIFFEST * bent / muscle["rest_length"] ** 2)
+
+
+def _slack(model: Mapping[str, Any], ports: Ports, text: str) -> list[str]:
+    """Muscles that are slack without air because the file says nothing else, where their force
+    model alone pushes back: a file of the time when they did may rely on it.
+    """
+    from pamrs.rig._muscle import Muscle
+
+    given = tomllib.loads(text).get("muscle", {})
+    found: list[str] = []
+    if (model["load"] or {}).get("kind") == "frame":
+        return found  # what is held lags nowhere
+    for name, table in tables_of(model, "muscle").items():
+        said = given.get(name, {}) if name else given
+        if not said or "buckling_load" in said or table["buckling_load"] > 0.0:
+            continue
+        muscle, label = Muscle.from_model(table), qualified("muscle", name)
+        last = min(_most_contracted(model, ports, name), muscle.contraction_range[1])
+        push = -float(muscle.force_table(0.0, np.linspace(0.0, max(last, 0.0), _ANGLES)).min())
+        if push > _borne(table):
+            found.append(
+                f"{label} is slack without air, since {label}.buckling_load is not given, and its "
+                f"force model alone would push back by up to {push:.3g} N: a model that relies on "
+                "that lags where the muscle is slack; buckling_load says what it bears without air "
+                "(0 N: nothing)"
+            )
+    return found
+
+
+def _most_contracted(model: Mapping[str, Any], ports: Ports, name: str) -> float:
+    """The largest contraction ratio that a joint or load leaves a muscle; 0 where nothing moves."""
+    from pamrs.rig._joint import Joint
+
+    rest = float(tables_of(model, "muscle")[name]["rest_length"])
+    if model["load"]:
+        return 1.0 - float(model["load"]["min_length"]) / rest
+    kind, _, joint = ports["muscle"][name]["joint"].partition(".")
+    if kind != "joint":
+        return 0.0
+    table = tables_of(model, "joint")[joint]
+    way = Joint.from_model(tables_of(model, "transmission").get(name, table))
+    angles = np.linspace(table["min_angle"], table["max_angle"], _ANGLES)
+    there = angles[way.reaches(angles)]
+    return float(way.shortening(there).max(initial=0.0)) / rest
 
 
 def _late(label: str, valve: Mapping[str, Any]) -> list[str]:

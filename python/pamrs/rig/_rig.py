@@ -207,11 +207,11 @@ class Rig(View):
     def cautions(self) -> list[str]:
         """What of the rig is possible, and most likely a mistake, one sentence each: chambers that
         no air reaches, valves that never pass air, delays as long as the period of the pulses,
-        muscles that push more than rubber bears, that are too long or short for their joint, or
-        whose largest pressure nobody says, friction of exactly nothing, measured values without a
-        tolerance. Empty where nothing is.
+        muscles that push more than rubber bears, of which nobody says what they bear without air,
+        that are too long or short for their joint, or whose largest pressure nobody says, friction
+        of exactly nothing, measured values without a tolerance. Empty where nothing is.
         """
-        return cautions_of(self._model, self._connected, self._known)
+        return cautions_of(self._model, self._connected, self._known, self._text)
 
     @cached_property
     def _connected(self) -> Ports:

@@ -23,6 +23,7 @@ from pamrs.diagnosis.fit import (
     Key,
     Problem,
     Start,
+    Weights,
     acts_in,
     entry_of,
     fit,
@@ -37,7 +38,7 @@ from pamrs.diagnosis.fit import (
     with_effects_of,
     without_term,
 )
-from pamrs.diagnosis.noise import CORRELATED_VARIANCE, Excess, NoiseLevel, excess, inflation
+from pamrs.diagnosis.noise import CORRELATED_VARIANCE, Excess, NoiseLevel, apart, excess, inflation
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import predicted_by_others
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -273,7 +274,7 @@ class Attempts:
         """Whether there is no held-out recording."""
         return self.outer.recordings is self.inner.recordings
 
-    def autocorrelation(self, found: Fit) -> dict[str, float]:
+    def autocorrelation(self, found: Fit) -> Weights:
         """Weights of the autocorrelation that a fit leaves, and at the least that of the noise."""
         return autocorrelation_of(self.inner, found, self.noise_level)
 
@@ -411,7 +412,7 @@ class Attempts:
         def found() -> Candidate:
             best = self._fit(starts, autocorrelation, warm, evaluations=limit)
             weights = self.autocorrelation(best)
-            if max(weights.values()) > CORRELATED_VARIANCE:
+            if weights.largest > CORRELATED_VARIANCE:
                 again = [self.start_of(best, effect) for effect in effects]
                 best = self._fit(again, weights, best, evaluations=limit)
             return self.judge(effects, best)
@@ -549,7 +550,7 @@ class Attempts:
         def found(alone: bool) -> Candidate:
             first = fitted(self.white, self._fit_alone(names) if alone else baseline)
             autocorrelation = self.autocorrelation(first)
-            correlated = max(autocorrelation.values()) > CORRELATED_VARIANCE
+            correlated = autocorrelation.largest > CORRELATED_VARIANCE
             judged = self.judge((), fitted(autocorrelation, first) if correlated else first)
             return replace(judged, wrong=names)
 
@@ -648,9 +649,10 @@ def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:
 
 def autocorrelation_of(
     problem: Problem, found: Fit, noise_level: Mapping[Key, NoiseLevel]
-) -> dict[str, float]:
+) -> Weights:
     """Weights of the autocorrelation that a fit leaves in each block, and at the least that of the
-    noise: parameters that follow the noise of a drive leave too little of it.
+    noise: parameters that follow the noise of a drive leave too little of it. A recording that is
+    missed by far more than most counts by its own, so that it takes no weight from the others.
     """
 
     def noise_of(block: Block) -> float:
@@ -658,10 +660,11 @@ def autocorrelation_of(
         levels = [noise_level[key].inflation for key in keys if key in noise_level]
         return float(np.mean(levels)) if levels else 1.0
 
-    return {
-        b.name: max(noise_of(b), inflation(b, problem.recordings, found.residuals, FIT_BIN_TIME))
-        for b in problem.blocks
-    }
+    given = problem.recordings, found.residuals, FIT_BIN_TIME
+    usual = {b.name: max(noise_of(b), inflation(b, *given)) for b in problem.blocks}
+    return Weights(
+        usual, {key: own for b in problem.blocks for key, own in apart(b, *given).items()}
+    )
 
 
 def parts_of(

@@ -1,10 +1,12 @@
 """Models fitted to all blocks and recordings together: parameters inside their tolerances, effects
 from several starts.
 
-Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `with_priors`,
-`predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`; `levenberg_marquardt`; `Start`,
-`starts_of`, `CHOSEN` (where the fit of an effect begins); `form_in`, `entry_of`,
-`with_effects_of`, `with_entry`, `without_term` (effects of a rig and their forms);
+Public: `Problem`, `Fit`, `Scaling`, `Weights`,
+`Unfollowed`, `fit`, `residuals`, `changes`, `stacked`,
+`with_priors`, `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`;
+`levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where the fit of an effect begins);
+`form_in`, `entry_of`, `with_effects_of`, `with_entry`, `without_term` (effects of a rig
+and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
 `depends`, `fits`, `places_of`, `same_data_in` (where effects act); `holdable`,
 `without_passing`, `known_parameters`, `with_known` (effects that the nominal model holds, and what
@@ -31,6 +33,8 @@ from pamrs.diagnosis.fit._fitting import (
     Key,
     Problem,
     Scaling,
+    Unfollowed,
+    Weights,
     bin_width,
     changes,
     fit,
@@ -75,6 +79,8 @@ __all__ = [
     "Problem",
     "Scaling",
     "Start",
+    "Unfollowed",
+    "Weights",
     "acts_in",
     "bin_width",
     "changes",

@@ -45,6 +45,7 @@ _SHIFT_TOLERANCES = 0.01
 _UNKNOWN_SHARE = 1e-5  # the same of one without a tolerance, as a share of its value
 # the same in a fit to its end: one that stopped early looked like physics (decision 22)
 FINAL_STEP_SHARE = 1e-5
+_LAST_STEPS = 2  # of which one left the range, where a fit was stopped there: it creeps on
 FIT_BIN_TIME = 0.02  # [s] bins of residuals for fits: faster than any effect of the catalogue shows
 
 
@@ -68,6 +69,44 @@ def _logarithmic(name: str) -> bool:
     """Whether a parameter is one of them, wherever its effect acts."""
     effect = effect_of(name)
     return effect is not None and effect.id + name.removeprefix(str(effect)) in LOGARITHMIC
+
+
+class Weights(dict[str, float]):
+    """Variance of each block's binned residual relative to white sample noise, by which it counts
+    less.
+
+    Parameters
+    ----------
+    usual : mapping of str to float
+        By block.
+    apart : mapping of (str, str) to float
+        By block and recording, of recordings that count by their own.
+    """
+
+    def __init__(self, usual: Mapping[str, float], apart: Mapping[Key, float]) -> None:
+        super().__init__(usual)
+        self.apart = dict(apart)
+
+    @property
+    def largest(self) -> float:
+        """That of the block, or of the recording, that counts least."""
+        return max([*self.values(), *self.apart.values()])
+
+
+class Unfollowed(SimulationError):
+    """A model that leaves the range in which it holds where one recording drives it.
+
+    Parameters
+    ----------
+    block, recording : str
+        What it was to predict, and of which recording.
+    why : str
+        What happened.
+    """
+
+    def __init__(self, block: str, recording: str, why: str) -> None:
+        super().__init__(f"block {block} of {recording}: {why}")
+        self.recording = recording
 
 
 class Stopped(BaseException):
@@ -161,6 +200,8 @@ class Fit:
         Baseline parameters that no prior holds.
     inflation : dict of str to float
         Variance of each block's binned residual relative to white noise, by which it was weighted.
+    refused : SimulationError or None
+        Why it could go no further, where one of the last steps left the range of the model.
     """
 
     effects: tuple[Term, ...]
@@ -176,6 +217,7 @@ class Fit:
     events: Events | None = None
     freed: tuple[str, ...] = ()
     inflation: dict[str, float] = field(default_factory=dict)
+    refused: SimulationError | None = None
 
     @property
     def held_by_prior(self) -> dict[str, float]:
@@ -305,7 +347,10 @@ def _everywhere(
     def run(key: Key) -> Residual:
         if problem.stopped.is_set():
             raise Stopped
-        return one(*tasks[key])
+        try:
+            return one(*tasks[key])
+        except SimulationError as error:
+            raise Unfollowed(*key, str(error)) from error
 
     longest_first = sorted(tasks, key=steps, reverse=True)
     with _inside_range():
@@ -440,11 +485,14 @@ def stacked(
         Derivative of the rows with respect to each parameter, SI; None without parameters.
     """
     rows, slopes = [], []
+    own = inflation.apart if isinstance(inflation, Weights) else {}
     for prepared in problem.recordings:
         for block in problem.blocks:
-            r = found[block.name, prepared.recording.name]
+            key = block.name, prepared.recording.name
+            r = found[key]
             mean, counts = binned(r.value, r.rows, bin_width(prepared, FIT_BIN_TIME))
-            weight = np.sqrt(counts) / (r.noise * math.sqrt(inflation[block.name]))
+            variance = own.get(key, inflation[block.name])
+            weight = np.sqrt(counts) / (r.noise * math.sqrt(variance))
             rows.append(mean * weight)
             if r.jacobian is not None:
                 slope, _ = binned(r.jacobian, r.rows, bin_width(prepared, FIT_BIN_TIME))
@@ -581,7 +629,7 @@ def fit(
         Dotted effect parameters that are free, with their starts.
     inflation : dict of str to float
         Variance of each block's binned residual relative to white sample noise (autocorrelated
-        residuals count less).
+        residuals count less); of single recordings where it is :class:`Weights`.
     fixed : dict of str to float, optional
         Effect parameters that are held.
     warm : Fit, optional
@@ -614,8 +662,15 @@ def fit(
     prior[:, :count] = np.diag(bound)
     usual = {name: known for name in starts if (known := usual_values(name, forms)) is not None}
 
+    refused: list[SimulationError | None] = []
+
     def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
-        found = residuals(problem, scaling.rig(x, fixed or {}), scaling.names, events)
+        try:
+            found = residuals(problem, scaling.rig(x, fixed or {}), scaling.names, events)
+        except SimulationError as error:
+            refused.append(error)
+            raise
+        refused.append(None)
         rows, slope = stacked(problem, found, inflation)
         slopes = np.array(
             [scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)]
@@ -664,5 +719,6 @@ def fit(
         scales,
         events,
         loose,
-        dict(inflation),
+        inflation,
+        next(filter(None, refused[-_LAST_STEPS:]), None),
     )

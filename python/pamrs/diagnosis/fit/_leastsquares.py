@@ -9,7 +9,6 @@ sensitivities apart, and its tolerances are relative: it took four times as long
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -25,6 +24,7 @@ _STEP_SHARE = 2e-3  # the same in a first fit, as a share of the sum of squares 
 _STALL_EVALUATIONS = 5
 _FIRST_DAMPING = 1e-4  # damping with which Levenberg and Marquardt begin (Marquardt (1963))
 _MOST_DAMPING = 1e8  # damping at which they give up
+_MOST_SQUARES = 1e200  # sum of squares of rows and sensitivities that any damping leaves finite
 
 
 Array = NDArray[np.float64]
@@ -78,10 +78,10 @@ def levenberg_marquardt(
         """What there is at a point, and its normal equations."""
         found = evaluate(x)
         rows, jacobian, _ = found
-        # squares that overflow are outside the range as much as what is no number
+        # squares that overflow, or will, are outside the range as much as what is no number
         with np.errstate(over="ignore", invalid="ignore"):
             gradient, normal = jacobian.T @ rows, jacobian.T @ jacobian
-            known = math.isfinite(float(np.trace(normal) + rows @ rows))
+            known = float(np.trace(normal) + rows @ rows) < _MOST_SQUARES
         if not known:
             raise SimulationError("the model's sensitivities are too large to be fitted")
         return found, gradient, normal

@@ -2,12 +2,17 @@
 autocorrelation.
 
 Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `means_in_noises`,
-`model_error`, `error_sizes`, `with_sizes`, `correlation_time`, `inflation`.
+`model_error`, `error_sizes`, `with_sizes`, `correlation_time`, `inflation`, `apart`.
 """
 
 from __future__ import annotations
 
-from pamrs.diagnosis.noise._autocorrelation import CORRELATED_VARIANCE, correlation_time, inflation
+from pamrs.diagnosis.noise._autocorrelation import (
+    CORRELATED_VARIANCE,
+    apart,
+    correlation_time,
+    inflation,
+)
 from pamrs.diagnosis.noise._discrepancy import model_error
 from pamrs.diagnosis.noise._levels import (
     LEAST_SIZE,
@@ -26,6 +31,7 @@ __all__ = [
     "LEAST_SIZE",
     "Excess",
     "NoiseLevel",
+    "apart",
     "bins_of",
     "correlation_time",
     "error_sizes",

@@ -10,6 +10,8 @@ from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned
 
 # variance times autocorrelation time of residuals that weights a fit again (decision 20)
 CORRELATED_VARIANCE = 2.0
+# times that of the usual recording from which one counts by its own: it took the weight of all
+_APART = 100.0
 
 
 Array = NDArray[np.float64]
@@ -39,13 +41,38 @@ def inflated(values: Array, rows: NDArray[np.bool_], width: int, noise: float) -
     return float(np.mean(scaled**2)) * correlation_time(scaled) if scaled.size else 0.0
 
 
+def _inflations(
+    block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
+) -> dict[Key, float]:
+    """That of a block in each recording that has a sample of it."""
+    widths = {(block.name, p.recording.name): bin_width(p, width) for p in recordings}
+    values = {
+        key: inflated(found[key].value, found[key].rows, count, found[key].noise)
+        for key, count in widths.items()
+    }
+    return {key: value for key, value in values.items() if value > 0.0}
+
+
+def _most(values: dict[Key, float]) -> float:
+    """What recordings keep that are as usual; of an even number, by the lower one in the middle."""
+    seen = sorted(values.values())
+    return _APART * max(1.0, seen[(len(seen) - 1) // 2]) if seen else 0.0
+
+
 def inflation(
     block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
 ) -> float:
     """Variance of a block's bin means relative to white sample noise, times their correlation time
-    (>= 1).
+    (>= 1), but for the recordings that stand apart.
     """
-    residuals = [(p, found[block.name, p.recording.name]) for p in recordings]
-    values = [inflated(r.value, r.rows, bin_width(p, width), r.noise) for p, r in residuals]
-    seen = [value for value in values if value > 0.0]
+    values = _inflations(block, recordings, found, width)
+    seen = [value for value in values.values() if value <= _most(values)]
     return max(1.0, float(np.mean(seen))) if seen else 1.0
+
+
+def apart(
+    block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
+) -> dict[Key, float]:
+    """The same of each recording in which it is by far larger than in half of them."""
+    values = _inflations(block, recordings, found, width)
+    return {key: value for key, value in values.items() if value > _most(values)}

@@ -6,13 +6,15 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 (recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible`, `without_dead_commands`, `without_impossible`,
 `without_rails`,
-`suspected_units` (what recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`,
+`suspected_units` (what recordings cannot be), `uncommanded`, `unusable` (which cannot be used),
+`prepare`, `Prepared`, `binned`, `noise_level`,
 `smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`,
 `available_blocks`, `Unjudged`, `unjudged_blocks` (blocks that the channels do not tell), `begun`,
 `change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`,
 `said_of_warm_starts` (beginnings that nobody measured), `blocks_beside_tanks`, `unread_tanks`,
 `with_tanks`, `said_of_tanks` (tanks without a gauge, which are simulated), `own_of_rig`, `varying`,
-`with_own_values`, `said_of_own` (values that are free in each recording).
+`with_own_values`, `said_of_own` (values that are free in each recording), `said_of_slack` (muscles
+that do not push back).
 """
 
 from __future__ import annotations
@@ -44,13 +46,15 @@ from pamrs.diagnosis.prepare._rails import without_rails
 from pamrs.diagnosis.prepare._signals import (
     Prepared,
     binned,
-    check_commands,
     noise_level,
     prepare,
     smoothed,
     thermometers_of,
+    uncommanded,
+    unusable,
     warm_chambers,
 )
+from pamrs.diagnosis.prepare._slack import said_of_slack
 from pamrs.diagnosis.prepare._thermometers import without_poor_thermometers
 from pamrs.diagnosis.prepare._units import noted_units, suspected_units
 from pamrs.diagnosis.prepare._unread import (
@@ -77,7 +81,6 @@ __all__ = [
     "binned",
     "blocks_beside_tanks",
     "change",
-    "check_commands",
     "check_plausible",
     "check_sense",
     "implausible",
@@ -91,12 +94,15 @@ __all__ = [
     "said_of_beginnings",
     "said_of_warm_starts",
     "said_of_own",
+    "said_of_slack",
     "said_of_tanks",
     "smoothed",
     "suspected_units",
     "thermometers_of",
     "unjudged_blocks",
+    "uncommanded",
     "unread_tanks",
+    "unusable",
     "varying",
     "warm_chambers",
     "without_copies",

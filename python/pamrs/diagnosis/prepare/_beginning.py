@@ -84,10 +84,30 @@ def begun_alike(
     beginnings = _Beginnings(blocks, core, prepared)
     counts = {block.channel: beginnings.remembered(block) for block in blocks}
     unsettled = {channel: count for channel, count in counts.items() if count > 0}
-    prepared = replace(prepared, unsettled=unsettled) if unsettled else prepared
+    prepared = replace(prepared, unsettled=unsettled, unheard=_unheard(blocks, core, prepared))
     moving = [block for block in blocks if block.mechanical and block.window is not None]
     rests = [block.channel for block in moving if _rests(block, core, prepared, tolerances or {})]
     return replace(prepared, at_rest=frozenset(rests), _begun={}) if rests else prepared
+
+
+def _unheard(
+    blocks: Sequence[Block], core: _core.Rig, prepared: Prepared
+) -> dict[str, NDArray[np.bool_]]:
+    """Rows of each channel that show when a command changed in a hole, which nobody recorded: what
+    is not measured behind it (a regulator's outlet, a spool, the flow in a tube) went on there.
+    """
+    early, found = prepared.commanded_early(), dict[str, NDArray[np.bool_]]()
+    if early is None:
+        return found
+    for block in blocks:
+        try:
+            apart = predicted(block, core, early) - predicted(block, core, prepared)
+        except SimulationError:
+            continue  # the fit says what cannot be predicted
+        shown = np.abs(apart) > _OUTLET_NOISES * prepared.noise[block.channel]
+        if shown.any():
+            found[block.channel] = shown
+    return found
 
 
 def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances) -> bool:
@@ -288,6 +308,13 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
             )
             said.append(
                 f"block {block.name}: the first {told} were not judged: {_unmeasured(block)}"
+            )
+        heard = [(p, p.unheard[block.channel].sum()) for p in each if block.channel in p.unheard]
+        if heard:
+            told = ", ".join(f"{count * p.dt:.3g} s of {p.recording.name}" for p, count in heard)
+            said.append(
+                f"block {block.name}: {told} were not judged: a command changed in a hole of the "
+                "log, and nobody recorded when"
             )
     return said
 

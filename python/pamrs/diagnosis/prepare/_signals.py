@@ -8,9 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 from scipy.signal import savgol_filter
 from scipy.stats import chi2, norm
 
+from pamrs import _core
 from pamrs.channels import block_of, channel_of, dotted, with_trait
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
@@ -38,7 +40,9 @@ _START_LONGER_STDS = 1.5  # deviations allowed for longer stretches (decision 22
 # deviations by which slopes of two stretches may differ (Lepski 1991, decision 22)
 _START_SLOPE_STDS = 2.0
 _START_LEAST_SAMPLES = 8  # fewest samples of a stretch: a cubic takes four
-_BRIDGED_SAMPLES = 3  # longest hole in a driving signal that is bridged by a line
+_BRIDGED_SAMPLES = 3  # longest hole in a driving signal that is bridged
+# usual change of a command over as many samples beyond which it steps in a hole: a sine has 1.4
+_STEP_CHANGES = 3.0
 # share of repeated samples from which values step by a converter; corners of triangles give 1 %
 _ROUNDED_STILL = 0.03
 # noise in converter steps below which rounding is not white; at half a step it nearly is
@@ -92,6 +96,9 @@ class Prepared:
     unsettled : dict of str to int
         First samples of a channel that are not judged, since they show where something that nobody
         measured began.
+    unheard : dict of str to (n,) bool array
+        Rows of a channel that are not judged, since they show when a command changed that was not
+        recorded as it did.
     temperatures : dict of str to float
         Temperature at which a gas without a thermometer began [K], by the channel of its pressure:
         that of the room but where the recording begins in a transient. The first windows are freed
@@ -112,6 +119,7 @@ class Prepared:
     settings: DiagnosisSettings
     steps: dict[str, float] = field(default_factory=dict)
     unsettled: dict[str, int] = field(default_factory=dict)
+    unheard: dict[str, Mask] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
     simulated: tuple[str, ...] = ()
     at_rest: frozenset[str] = frozenset()
@@ -138,7 +146,8 @@ class Prepared:
 
     def clear(self, drives: tuple[str, ...]) -> Mask:
         """Rows at which every drive was measured: holes of up to three samples are bridged, longer
-        ones are cut out together with what the smoothing carries over their edges.
+        ones, and those in which a command steps, are cut out together with what the smoothing
+        carries over their edges.
         """
         if drives not in self._clear:
             settings = self.settings
@@ -146,8 +155,9 @@ class Prepared:
             out = np.ones(self.n, dtype=bool)
             measured = [name for name in drives if name not in self.simulated]
             mask = self.recording.valid(*measured) if measured else out
-            for a, b in _long_holes(mask, _BRIDGED_SAMPLES):
-                out[max(0, a - reach) : b + reach] = False
+            for a, b in _long_holes(mask, 0):
+                if b - a > _BRIDGED_SAMPLES or any(_steps(c, a, b) for c in self.commands.values()):
+                    out[max(0, a - reach) : b + reach] = False
             out.flags.writeable = False
             self._clear[drives] = out
         return self._clear[drives]
@@ -191,6 +201,30 @@ class Prepared:
             self._begun[key] = value, slope
         return self._begun[key]
 
+    def bridged(self) -> Prepared:
+        """The same recording without a hole, for what is simulated through them: no window begins
+        anew behind one.
+        """
+        whole = {name: np.ones_like(own) for name, own in self.recording.mask.items()}
+        return replace(self, recording=replace(self.recording, mask=whole), _begun={}, _clear={})
+
+    def commanded_early(self) -> Prepared | None:
+        """The same recording with commands that change where a hole in them begins, and not where
+        it ends; None where that is the same.
+        """
+        commands, logged = dict(self.commands), dict(self.held)
+        for name in set(commands) & set(self.recording.channels):
+            mask = self.recording.mask[name]
+            early = held(commands[name][::-1], mask[::-1])[::-1]
+            if np.any(early != commands[name]):
+                each = logged[name].size // self.n
+                known = np.repeat(mask, each)
+                commands[name] = np.ascontiguousarray(early)
+                logged[name] = np.where(known, logged[name], np.repeat(early, each))
+        if all(commands[name] is own for name, own in self.commands.items()):
+            return None
+        return replace(self, commands=commands, held=logged)
+
     def shaken(self, shaken: dict[str, tuple[Array, Array]]) -> Prepared:
         """The same recording with other smoothed channels; what the others begin from is not looked
         for again.
@@ -208,6 +242,8 @@ class Prepared:
             first = np.flatnonzero(bad[a:b])
             rows[a : a + (int(first[0]) if first.size else b - a)] = True
         rows[: self.unsettled.get(output, 0)] = False
+        if output in self.unheard:
+            rows &= ~self.unheard[output]
         return rows & self.recording.mask[output]
 
 
@@ -393,6 +429,16 @@ def _long_holes(mask: Mask, bridged: int) -> list[tuple[int, int]]:
     ]
 
 
+def _steps(command: Array, a: int, b: int) -> bool:
+    """Whether a command steps in a hole from one sample to another: by far more than it usually
+    changes over as many.
+    """
+    if a == 0 or b == command.size or command[b] == command[a - 1]:
+        return False
+    usual = float(np.median(np.abs(command[b - a + 1 :] - command[: a - b - 1])))
+    return bool(abs(command[b] - command[a - 1]) > _STEP_CHANGES * usual)
+
+
 def _state(
     values: Array, mask: Mask, noise: float, dt: float, at: int
 ) -> tuple[float, float] | None:
@@ -437,8 +483,15 @@ def _state(
 
 
 def _bridged(values: Array, mask: Mask) -> Array:
-    index = np.arange(values.size)
-    return np.asarray(np.interp(index, index[mask], values[mask]), dtype=np.float64)
+    """A channel with its holes bridged by cubics that turn nowhere between samples (Fritsch &
+    Butland 1984), and before the first sample and after the last one as it is there.
+    """
+    there, missing = np.flatnonzero(mask), np.flatnonzero(~mask)
+    bridged = values.copy()
+    if missing.size:
+        between = PchipInterpolator(there, values[there])
+        bridged[missing] = between(np.clip(missing, there[0], there[-1]))
+    return bridged
 
 
 def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prepared:
@@ -458,31 +511,12 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
     DiagnosisError
         If the recording is too short, or lacks a channel that the rig's blocks need.
     """
-    wanted = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
-    if not set(wanted) & set(recording.channels):
-        raise DiagnosisError(
-            f"recording {recording.name!r} has no channel {' or '.join(wanted)}, without which no "
-            f"block can be cut out; it has: {', '.join(recording.channels)}"
-        )
-    length = max(_LEAST_SAMPLES, filter_length(recording.sample_time, settings))
-    if len(recording) < length:
-        raise DiagnosisError(
-            f"recording {recording.name!r} has {len(recording)} samples; at least {length} are "
-            "needed for a diagnosis"
-        )
     core = core_rig(rig)
-    check_commands(recording, rig, core.inputs)
+    if why := unusable(recording, rig, core, settings):
+        raise DiagnosisError(f"recording {recording.name!r}: {why}")
     signals, raw, noise, lengths, steps = {}, {}, {}, {}, {}
-    drives = [name for name in core.channels if channel_of(name) in DRIVES]
-    for name in (*drives, *pulls_of(rig).values(), *thermometers_of(rig).values()):
-        if name not in recording.channels:
-            continue  # what is measured of a block that the rig does not have is left alone
+    for name in _looked_at(recording, rig, core):
         mask = recording.mask[name]
-        if few_usable(mask):
-            raise DiagnosisError(
-                f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of "
-                f"{name} are usable"
-            )
         raw[name] = filled = _bridged(recording.channels[name], mask)
         noise[name] = _noise_of(recording, name, settings)
         rounded = _stays(recording.channels[name], mask)
@@ -500,6 +534,54 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         for name, values in commands.items()
     }
     return Prepared(recording, commands, as_logged, signals, raw, noise, lengths, settings, steps)
+
+
+def _looked_at(recording: Recording, rig: Rig, core: _core.Rig) -> list[str]:
+    """Measured channels of a recording that its rig has a use for: what is measured of a block that
+    it does not have is left alone.
+    """
+    drives = [name for name in core.channels if channel_of(name) in DRIVES]
+    every = (*drives, *pulls_of(rig).values(), *thermometers_of(rig).values())
+    return [name for name in every if name in recording.channels]
+
+
+def unusable(recording: Recording, rig: Rig, core: _core.Rig, settings: DiagnosisSettings) -> str:
+    """Why a recording cannot be diagnosed; empty where it can.
+
+    Parameters
+    ----------
+    recording : Recording
+        As loaded.
+    rig : Rig
+        Nominal model.
+    core : _core.Rig
+        The same, compiled.
+    settings : DiagnosisSettings
+        How it is made ready.
+
+    Returns
+    -------
+    str
+        That it is too short, or lacks a channel or usable samples of one that the rig's blocks
+        need.
+    """
+    wanted = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
+    if not set(wanted) & set(recording.channels):
+        return (
+            f"it has no channel {' or '.join(wanted)}, without which no block can be cut out; it "
+            f"has: {', '.join(recording.channels)}"
+        )
+    length = max(_LEAST_SAMPLES, filter_length(recording.sample_time, settings))
+    if len(recording) < length:
+        return f"it has {len(recording)} samples; at least {length} are needed for a diagnosis"
+    if why := uncommanded(recording, rig, core.inputs):
+        return why
+    for name in _looked_at(recording, rig, core):
+        mask = recording.mask[name]
+        if few_usable(mask):
+            return f"only {int(mask.sum())} of {mask.size} samples of {name} are usable"
+    lost = [n for n in core.inputs if n in recording.mask and not recording.mask[n].any()]
+    return f"no usable sample of {lost[0]}" if lost else ""
 
 
 def _noise_of(recording: Recording, name: str, settings: DiagnosisSettings) -> float:
@@ -583,17 +665,18 @@ def moves_by_gauges(recording: Recording, rig: Rig) -> bool:
     return bool(joints) and {*joints, *pulling} <= set(recording.channels)
 
 
-def check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
-    """Refuse a recording without a command, unless what moves a joint or load was measured past the
-    valves.
+def uncommanded(recording: Recording, rig: Rig, inputs: list[str]) -> str:
+    """That a recording lacks a command, unless what moves a joint or load was measured past the
+    valves; else empty.
     """
     missing = [name for name in inputs if name not in recording.channels]
-    if missing and not moves_by_gauges(recording, rig):
-        what = "valve" if channel_of(missing[0]) == "valve_command" else "regulator"
-        raise DiagnosisError(
-            f"recording {recording.name!r} has no channel {missing[0]}, and the rig has a {what}; "
-            f"it has: {', '.join(recording.channels)}"
-        )
+    if not missing or moves_by_gauges(recording, rig):
+        return ""
+    what = "valve" if channel_of(missing[0]) == "valve_command" else "regulator"
+    return (
+        f"it has no channel {missing[0]}, and the rig has a {what}; it has: "
+        f"{', '.join(recording.channels)}"
+    )
 
 
 def _command(recording: Recording, rig: Rig, name: str) -> Array:
@@ -607,8 +690,6 @@ def _command(recording: Recording, rig: Rig, name: str) -> Array:
         )
         return np.full(len(recording), float(rig.tables(table)[block][key]))
     mask = recording.mask[name]
-    if not mask.any():
-        raise DiagnosisError(f"recording {recording.name!r}: no usable sample of {name}")
     return held(recording.channels[name], mask)
 
 

@@ -88,7 +88,7 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
         found = available_blocks(rig, (*names, *flat.simulated))
         (own,) = [replace(b, window=None) for b in found if b.name == full]
         try:
-            value = predicted(own, core, flat)
+            value = predicted(own, core, flat.bridged())
         except SimulationError:  # it then stands still
             value = level
         slope = np.gradient(value, prepared.dt)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
+
+import numpy as np
 
 from pamrs.diagnosis.evidence import WALL_TOLERANCES, autocorrelation_of
 from pamrs.diagnosis.fit import (
@@ -12,30 +15,66 @@ from pamrs.diagnosis.fit import (
     Fit,
     Key,
     Problem,
+    Unfollowed,
+    Weights,
     bin_width,
     fit,
     known_parameters,
+    residuals,
+    stacked,
 )
 from pamrs.diagnosis.noise import CORRELATED_VARIANCE, NoiseLevel
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
+_MOST_WEIGHTINGS = 8  # of a refit beside recordings that count by their own
+_LEAST_OTHERS = 2  # recordings that have to agree against one: a single one is fitted by anything
+_DRAGGED = 25.0  # times as large a sum of squares of the others beside one recording as without it
+
 
 def with_autocorrelation(
     problem: Problem, nominal: Rig, first: Fit, noise_level: Mapping[Key, NoiseLevel]
-) -> tuple[Fit, dict[str, float]]:
+) -> tuple[Fit, Weights]:
     """The refitted baseline, fitted on with the autocorrelation that it leaves as weights where
     that is large, and the weights. What then lies at the end of its tolerances may have followed
     the noise there: it is fitted from the nominal values too.
     """
     autocorrelation = autocorrelation_of(problem, first, noise_level)
-    if max(autocorrelation.values()) <= CORRELATED_VARIANCE:
+    if autocorrelation.largest <= CORRELATED_VARIANCE:
         return first, autocorrelation
     found = thorough(problem, nominal, autocorrelation, first)
+    for _ in range(_MOST_WEIGHTINGS if autocorrelation.apart else 0):
+        # what stands apart had moved the baseline, and that missed the others
+        last, autocorrelation = autocorrelation, autocorrelation_of(problem, found, noise_level)
+        found = thorough(problem, nominal, autocorrelation, found)
+        if all(CORRELATED_VARIANCE * now >= last[name] for name, now in autocorrelation.items()):
+            break
+    _tell_of_apart(problem, found, autocorrelation)
     if any(abs(moved) >= WALL_TOLERANCES for moved in found.moved.values()):
         found = min(found, thorough(problem, nominal, autocorrelation, None), key=lambda f: f.cost)
     return found, autocorrelation
+
+
+def _tell_of_apart(problem: Problem, found: Fit, weights: Weights) -> None:
+    """Name the recordings that a refit misses by far more than the others."""
+    for block, name in weights.apart:
+        missed = {
+            p.recording.name: _noise_levels(found.residuals[block, p.recording.name])
+            for p in problem.recordings
+        }
+        most = max(missed[n] for n in missed if (block, n) not in weights.apart)
+        problem.losses.tell(
+            f"block {block}: the refitted model misses {name} by {missed[name]:.3g} noise levels "
+            f"and the others by {most:.3g} at most: it counts less than they do; look at it, or "
+            "leave it out"
+        )
+
+
+def _noise_levels(found: Residual) -> float:
+    """Root mean square of a residual in noise levels."""
+    count = max(1, int(found.rows.sum()))
+    return float(np.linalg.norm(found.value[found.rows])) / math.sqrt(count) / found.noise
 
 
 def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: Fit | None) -> Fit:
@@ -56,24 +95,71 @@ def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: 
 
 def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
     """The baseline refitted from the nominal values and, where that leaves more than noise could,
-    from the other side of them.
+    from the other side of them; where one recording drags it away from the others, as they have it.
     """
-    settings = problem.settings
     first = thorough(problem, nominal, inflation, None)
     rows = sum(
         int(r.rows.sum()) / bin_width(p, FIT_BIN_TIME)
         for p in problem.recordings
         for r in _of(p, first.residuals)
     )
-    if 2.0 * first.cost < settings.noise_margin * rows:
+    if 2.0 * first.cost < problem.settings.noise_margin * rows:
         return first
+    if first.refused is not None or not any(first.moved.values()):
+        _check_moved(problem, nominal, inflation, first)
     known = known_parameters(nominal)
     mirrored = {n: 2.0 * known[n].value - first.values[n] for n in first.moved}
     try:
         second = thorough(problem, nominal, inflation, replace(first, values=mirrored))
+        first = min(first, second, key=lambda f: f.cost)
+        return _as_the_others(problem, nominal, inflation, first)
     except SimulationError:
         return first
-    return min(first, second, key=lambda f: f.cost)
+
+
+def _as_the_others(problem: Problem, nominal: Rig, inflation: dict[str, float], found: Fit) -> Fit:
+    """A refit with the values that all recordings have but the one that is missed most, where that
+    one makes most of what the others are missed by; else as it is.
+    """
+    missed = {
+        p.recording.name: max(map(_noise_levels, _of(p, found.residuals)))
+        for p in problem.recordings
+    }
+    worst = max(missed, key=lambda name: missed[name])
+    others = replace(
+        problem, recordings=[p for p in problem.recordings if p.recording.name != worst]
+    )
+    if len(others.recordings) < _LEAST_OTHERS:
+        return found
+    alone = thorough(others, nominal, inflation, None)
+    beside, _ = stacked(others, found.residuals, inflation)
+    if float(beside @ beside) < _DRAGGED * 2.0 * alone.cost:
+        return found
+    return fit(problem, nominal, (), {}, inflation, warm=alone, evaluations=1)
+
+
+def _check_moved(problem: Problem, nominal: Rig, inflation: dict[str, float], first: Fit) -> None:
+    """Say that a refit went no further, and why.
+
+    Raises
+    ------
+    Unfollowed
+        If one recording stopped it, which the model cannot follow where it fits the others.
+    """
+    stopped = first.refused
+    if isinstance(stopped, Unfollowed):
+        parts = [p for p in problem.recordings if p.recording.name != stopped.recording]
+        if parts:
+            alone = thorough(replace(problem, recordings=parts), nominal, inflation, None)
+            residuals(problem, alone.rig)
+            return
+    if first.evaluations > 1:
+        most = max(map(abs, first.moved.values()), default=0.0)
+        why = f"the next step leaves the model's range ({stopped})" if stopped else "no step did"
+        problem.losses.tell(
+            f"the refit of the baseline stopped {most:.2f} tolerances from the rig file's values, "
+            f"although others inside their tolerances should leave less: {why}"
+        )
 
 
 def _of(prepared: Prepared, found: dict[Key, Residual]) -> list[Residual]:

@@ -22,6 +22,11 @@ from pamrs.units import parse_unit
 Array = NDArray[np.float64]
 
 
+#: What a heading has behind its name: a unit in brackets (a number there tells two columns of one
+#: name from each other), and what parts it from the name.
+_UNIT: Final = re.compile(r"[\s_]*([\[({<](?!\d+[\])}>])[^\[\](){}<>]*[\])}>])?[\s_]*$")
+
+
 @dataclass(frozen=True, eq=False)
 class Series:
     """One channel of a log as the log has it: not scaled, not judged.
@@ -108,7 +113,8 @@ class Log:
         Parameters
         ----------
         name : str
-            The whole path, or its end: ``p1`` for ``rig/p1``.
+            The whole path, or its end: ``p1`` for ``rig/p1``; or as the heading stands in the file,
+            with its unit or what an earlier version left of that: ``p1_(bar)``, ``p1_``.
 
         Returns
         -------
@@ -130,6 +136,9 @@ class Log:
             )
         if name in self.unread:
             raise RecordingError(f"{self.path}: {name!r} cannot be used: {self.unread[name]}")
+        alone = _UNIT.sub("", name)
+        if alone != name and any(f"/{known}".endswith(f"/{alone}") for known in self.series):
+            return self.find(alone)
         near = difflib.get_close_matches(name, self.series, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise RecordingError(
