@@ -150,6 +150,8 @@ class Rig:
         samples: int,
         outlets: dict[str, float] | None = None,
         anchors: list[int] = ...,
+        spacing: int | None = None,
+        heights: list[float] = ...,
     ) -> tuple[_Array, _Array | None]: ...
     def closure_terms(
         self,

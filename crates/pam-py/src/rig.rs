@@ -244,9 +244,11 @@ impl Rig {
 
     /// Predict a block's output from its measured neighbours, with the jacobian (None without
     /// parameters). Regulators that nobody measured begin at `outlets` [Pa, gauge] where given; a
-    /// block of a temperature takes its pressures anew at the samples `anchors` as well.
+    /// block of a temperature takes its pressures anew at the samples `anchors` as well. With a
+    /// `spacing` [samples] the block has an input that nobody measured, of these `heights` at its
+    /// knots, and the jacobian the derivatives with respect to them.
     #[allow(clippy::too_many_arguments, clippy::type_complexity)]
-    #[pyo3(signature = (block, commands, sample_time, step, starts, parameters, measured, samples, outlets=None, anchors=Vec::new()))]
+    #[pyo3(signature = (block, commands, sample_time, step, starts, parameters, measured, samples, outlets=None, anchors=Vec::new(), spacing=None, heights=Vec::new()))]
     fn predict<'py>(
         &self,
         py: Python<'py>,
@@ -260,6 +262,8 @@ impl Rig {
         samples: usize,
         outlets: Option<BTreeMap<String, f64>>,
         anchors: Vec<usize>,
+        spacing: Option<usize>,
+        heights: Vec<f64>,
     ) -> PyResult<(Bound<'py, numpy::PyArray1<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
         let p = self.cut(
             py,
@@ -275,6 +279,14 @@ impl Rig {
                 let ids = (parameters.iter())
                     .map(|name| self.inner.parameters().find(name))
                     .collect::<pam_core::Result<Vec<_>>>()?;
+                let forced;
+                let measured = match spacing {
+                    None => measured,
+                    Some(spacing) => {
+                        forced = measured.clone().with_input(spacing, &heights)?;
+                        &forced
+                    }
+                };
                 predict(&self.inner, block, measured, timing, &starts, &ids)
             },
         )?;

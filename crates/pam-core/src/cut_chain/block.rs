@@ -2,7 +2,7 @@
 
 use super::measured::Measured;
 use crate::description::dotted;
-use crate::plant::{Acting, Layout, Node, Place, Rig, Simulated};
+use crate::plant::{Acting, InputPort, Layout, Node, Place, Rig, Simulated};
 use crate::{Error, Result};
 use std::ops::Range;
 
@@ -78,6 +78,18 @@ impl Block {
         }
         let simulated = self.simulated(rig, measured);
         rig.air_step(|node| node.place(rig.layout()).is_some_and(|place| simulated.moves(place)))
+    }
+
+    /// Where an input that nobody measured enters; None where it would only add to what is read.
+    pub(super) fn input(self, layout: &Layout) -> Option<InputPort> {
+        match self {
+            Self::Supply(k) => Some(InputPort::Flow(Node::Supply(k))),
+            Self::Chamber(k) | Self::Temperature(k) if k < layout.gases => {
+                Some(InputPort::Flow(Node::Gas(k)))
+            }
+            Self::Arm(k) => Some(InputPort::Torque(k)),
+            _ => None,
+        }
     }
 
     /// Whether muscles and what they move make its output, and not air alone.
@@ -225,6 +237,18 @@ pub(super) fn check(
             worst,
             format!("sample indices rising from 0, below {n}"),
         ));
+    }
+    let wanted: usize = measured.knots(starts).iter().sum();
+    if let Some(input) = &measured.input {
+        if block.input(rig.layout()).is_none() {
+            let why = "nothing integrates what acts there";
+            return Err(Error::Model(format!("block '{block:?}' has no input: {why}")));
+        }
+        if !input.heights.is_empty() && input.heights.len() != wanted {
+            let (name, found) = ("heights".into(), input.heights.len());
+            let why = "one per knot of every window".into();
+            return Err(Error::Length { name, found, expected: wanted, why });
+        }
     }
     if matches!(block, Block::Arm(_))
         && rig.spec().load.as_ref().is_some_and(|load| load.is_frame())

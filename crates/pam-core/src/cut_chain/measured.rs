@@ -76,6 +76,24 @@ impl Signal<'_> {
     }
 }
 
+/// An input of a block that nobody measured, piecewise linear in time: a torque [N m], a force [N]
+/// or a mass flow [kg/s].
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Input {
+    /// Samples from one knot to the next.
+    pub spacing: usize,
+    /// Its value at each knot of each window, the windows one after the other; zero where there are
+    /// none.
+    pub heights: Vec<f64>,
+}
+
+impl Input {
+    /// Knots of a window of so many samples.
+    pub fn knots(&self, samples: usize) -> usize {
+        samples.div_ceil(self.spacing) + 1
+    }
+}
+
 /// Measured signals around a block.
 #[derive(Debug, Clone)]
 pub struct Measured<'a> {
@@ -92,6 +110,8 @@ pub struct Measured<'a> {
     pub(crate) outlets: Vec<(usize, f64)>,
     /// Samples inside the windows of a temperature at which the pressures are taken anew.
     pub(crate) anchors: Vec<usize>,
+    /// What the block gets beside what its model makes.
+    pub(crate) input: Option<Input>,
 }
 
 impl<'a> Measured<'a> {
@@ -168,6 +188,7 @@ impl<'a> Measured<'a> {
             thermometers,
             outlets: Vec::new(),
             anchors: Vec::new(),
+            input: None,
         })
     }
 
@@ -206,6 +227,32 @@ impl<'a> Measured<'a> {
         }
         self.anchors = anchors.to_vec();
         Ok(self)
+    }
+
+    /// The same, with an input of the block that nobody measured: a torque on the joint [N m], a
+    /// force on the load [N], a mass flow into the gas or supply [kg/s]. It is linear between knots,
+    /// so many samples apart from the beginning of each window to behind its end; `heights` has its
+    /// value at each, window by window, or nothing where it is zero. The derivatives of a prediction
+    /// with respect to them come last.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a spacing of 0, or a height that is not finite.
+    pub fn with_input(mut self, spacing: usize, heights: &[f64]) -> Result<Self> {
+        if spacing == 0 {
+            return Err(Error::parameter("spacing", 0.0, "at least one sample"));
+        }
+        if let Some((k, v)) = heights.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+            return Err(Error::parameter(format!("heights[{k}]"), *v, "a finite value"));
+        }
+        self.input = Some(Input { spacing, heights: heights.to_vec() });
+        Ok(self)
+    }
+
+    /// Knots of each window of the input; none without one.
+    pub(crate) fn knots(&self, starts: &[usize]) -> Vec<usize> {
+        let ends = starts.iter().skip(1).copied().chain([self.samples]);
+        let lengths = starts.iter().zip(ends).map(|(a, b)| b - a);
+        self.input.iter().flat_map(|input| lengths.clone().map(|n| input.knots(n))).collect()
     }
 
     /// What the thermometer of a gas reads [K], where it has one.

@@ -17,8 +17,9 @@ use crate::{Error, Result};
 pub struct Prediction {
     /// Predicted output at each sample, as the sensor reads it.
     pub value: Vec<f64>,
-    /// Row-major `samples x (parameters + initial states)`: derivatives with respect to each
-    /// parameter and to the initial states of the window that the row belongs to.
+    /// Row-major `samples x (parameters + initial states + knots)`: derivatives with respect to each
+    /// parameter, to the initial states of the window that the row belongs to, and to the heights of
+    /// an input at the knots of that window.
     pub jacobian: Vec<f64>,
     /// Columns of the jacobian.
     pub columns: usize,
@@ -43,29 +44,34 @@ pub fn predict(
     let n = measured.samples;
     check(rig, block, measured, starts)?;
     let initial = block.initial_count(rig, measured);
+    let knots = measured.knots(starts).into_iter().max().unwrap_or(0);
     let value = room("samples", &[n], 0.0)?;
     let mut out = Prediction { value, jacobian: Vec::new(), columns: 0 };
-    if parameters.is_empty() {
+    if parameters.is_empty() && knots == 0 {
         let plant = Plant::new(rig, rig.parameters().lift(), false)?;
         let bumps = vec![0.0; initial];
-        Cut::new(plant, block, measured, timing, bumps)
+        Cut::new(plant, block, measured, timing, bumps, Vec::new())
             .run(starts, |k, y, _, _, _| out.value[k] = y)?;
         return Ok(out);
     }
-    out.columns = parameters.len() + initial;
+    out.columns = parameters.len() + initial + knots;
     out.jacobian = room("sensitivities", &[n, out.columns], 0.0)?;
     let columns: Vec<usize> = (0..out.columns).collect();
-    let mut left = columns.as_slice();
-    while !left.is_empty() {
-        let wide = left.len() > LANES;
-        let (chunk, rest) = left.split_at(left.len().min(if wide { WIDE_LANES } else { LANES }));
-        let task = Task { rig, block, measured, timing, starts, parameters };
-        if wide {
-            task.differentiate::<WIDE_LANES>(chunk, &mut out)?;
-        } else {
-            task.differentiate::<LANES>(chunk, &mut out)?;
+    // knots of one window do nothing in another, parameters do: they are not differentiated together
+    let (lasting, passing) = columns.split_at(parameters.len() + initial);
+    for mut left in [lasting, passing] {
+        while !left.is_empty() {
+            let wide = left.len() > LANES;
+            let (chunk, rest) =
+                left.split_at(left.len().min(if wide { WIDE_LANES } else { LANES }));
+            let task = Task { rig, block, measured, timing, starts, parameters, knots };
+            if wide {
+                task.differentiate::<WIDE_LANES>(chunk, &mut out)?;
+            } else {
+                task.differentiate::<LANES>(chunk, &mut out)?;
+            }
+            left = rest;
         }
-        left = rest;
     }
     Ok(out)
 }
@@ -78,6 +84,7 @@ struct Task<'a> {
     timing: Timing,
     starts: &'a [usize],
     parameters: &'a [ParameterId],
+    knots: usize,
 }
 
 impl Task<'_> {
@@ -86,18 +93,22 @@ impl Task<'_> {
     where
         Dual<N>: Number,
     {
-        let Self { rig, block, measured, timing, starts, parameters } = *self;
+        let Self { rig, block, measured, timing, starts, parameters, knots } = *self;
         let mut values = rig.parameters().lift::<Dual<N>>();
         let mut bumps = vec![constant::<Dual<N>>(0.0); block.initial_count(rig, measured)];
+        let mut hats = vec![constant::<Dual<N>>(0.0); knots];
+        let first = parameters.len();
         for (lane, column) in columns.iter().enumerate() {
+            let along = Dual::from(0.0).along(lane);
             match parameters.get(*column) {
                 Some(id) => values.seed(*id, lane),
-                None => bumps[column - parameters.len()] = Dual::from(0.0).along(lane),
+                None if column - first < bumps.len() => bumps[column - first] = along,
+                None => hats[column - first - bumps.len()] = along,
             }
         }
         let plant = Plant::new(rig, values, false)?;
         let Prediction { value, jacobian, columns: width } = out;
-        Cut::new(plant, block, measured, timing, bumps).run(starts, |k, y, _, _, _| {
+        Cut::new(plant, block, measured, timing, bumps, hats).run(starts, |k, y, _, _, _| {
             value[k] = y.re;
             for (column, slope) in columns.iter().zip(y.eps) {
                 jacobian[k * *width + column] = slope;
@@ -127,7 +138,7 @@ pub fn closure_terms(
     let plant = Plant::new(rig, rig.parameters().lift(), false)?;
     let (mut found, mut count) = (Vec::new(), 0);
     let bumps = vec![0.0; block.initial_count(rig, measured)];
-    Cut::new(plant, block, measured, timing, bumps).run(
+    Cut::new(plant, block, measured, timing, bumps, Vec::new()).run(
         starts,
         |_, _, stepper, state, controls| {
             let terms = stepper.plant.terms(at, state, controls, &stepper.scratch);

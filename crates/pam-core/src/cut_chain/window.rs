@@ -6,7 +6,7 @@ use super::boundary::{driven, rest_length, taps, zero, Driven};
 use super::clock::Clocks;
 use super::measured::Measured;
 use crate::effects::Number;
-use crate::plant::{Controls, Memory, Plant, Simulated};
+use crate::plant::{Controls, InputPort, Memory, Plant, Simulated};
 use crate::scalar::{constant, Scalar};
 use crate::simulate::{check_state, Stepper, Timing};
 use crate::Result;
@@ -29,6 +29,12 @@ pub(super) struct Cut<'a, S> {
     taps: Vec<(usize, usize)>,
     driving_taps: Vec<(usize, usize)>,
     output: Output<S>,
+    /// Where an input enters, where there is one.
+    entry: Option<InputPort>,
+    /// Changes of the input at the knots of every window.
+    hats: Vec<S>,
+    /// First sample of the present window, and its first knot among those of all windows.
+    window: (usize, usize),
 }
 
 /// How much faster than at the beginning of a step a joint may become within it.
@@ -80,6 +86,7 @@ impl<'a, S: Number> Cut<'a, S> {
         measured: &'a Measured<'a>,
         timing: Timing,
         bumps: Vec<S>,
+        hats: Vec<S>,
     ) -> Self {
         let rig = plant.rig();
         let own = block.initial_states(rig.layout());
@@ -112,6 +119,9 @@ impl<'a, S: Number> Cut<'a, S> {
             drivers,
             taps,
             output,
+            entry: measured.input.as_ref().and_then(|_| block.input(rig.layout())),
+            hats,
+            window: (0, 0),
         }
     }
 
@@ -129,6 +139,7 @@ impl<'a, S: Number> Cut<'a, S> {
         for k in 0..n {
             let anchored = anchors.next_if(|s| **s == k).is_some();
             if starts.next_if(|s| **s == k).is_some() {
+                self.enter(k, &mut course);
                 self.start_window(k, &mut course);
                 self.start_temperature(k, &mut course);
             } else if anchored {
@@ -145,6 +156,29 @@ impl<'a, S: Number> Cut<'a, S> {
             }
         }
         Ok(())
+    }
+
+    /// A window begins: it has knots of its own, and nothing of what those of the one before did.
+    fn enter(&mut self, k: usize, course: &mut Course<S>) {
+        let Some(input) = &self.measured.input else { return };
+        let (start, first) = self.window;
+        self.window = (k, first + if k > 0 { input.knots(k - start) } else { 0 });
+        if !self.hats.iter().all(|hat| hat.same(&constant(0.0))) {
+            course.state.iter_mut().for_each(|value| *value = constant(value.re()));
+        }
+    }
+
+    /// The input at a share of the way from sample `k` to the next.
+    fn input(&self, k: usize, share: f64) -> S {
+        let Some(input) = &self.measured.input else { return constant(0.0) };
+        let (start, first) = self.window;
+        let place = ((k - start) as f64 + share) / input.spacing as f64;
+        let (cell, part) = (place.floor() as usize, place - place.floor());
+        let height = |knot: usize| {
+            let hat = self.hats.get(knot).copied().unwrap_or_else(|| constant(0.0));
+            input.heights.get(first + knot).map_or(hat, |height| hat + *height)
+        };
+        height(cell) * (1.0 - part) + height(cell + 1) * part
     }
 
     /// The channel that is predicted.
@@ -362,10 +396,15 @@ impl<'a, S: Number> Cut<'a, S> {
                 clocks = Clocks::of(&self.stepper.plant, self.block, time);
                 self.command(k * held + i * held / substeps, time, &clocks, controls);
             }
-            let (driving, taps) = (&self.driving, &self.driving_taps);
             let mut from = 0.0;
             while from < 1.0 {
                 let length = self.part(state, step, from);
+                if let Some(port) = self.entry {
+                    let at =
+                        |fraction: f64| self.input(k, (i as f64 + from + fraction * length) * h);
+                    self.stepper.input = Some((port, [at(0.0), at(0.5), at(1.0)]));
+                }
+                let (driving, taps) = (&self.driving, &self.driving_taps);
                 let drive =
                     |plant: &Plant<'a, S>, controls: &Controls<S>, fraction: f64, y: &mut [S]| {
                         let (rig, share) = (plant.rig(), (i as f64 + from + fraction * length) * h);

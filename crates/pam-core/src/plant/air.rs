@@ -1,7 +1,7 @@
 //! Flows between the nodes of a rig, what they do to the pressures, and how fast.
 
 use super::ports::{Flow, Place};
-use super::rates::{Controls, Line, Plant, Scratch, Simulated, Warm};
+use super::rates::{Controls, InputPort, Line, Plant, Scratch, Simulated, Warm};
 use super::units::Node;
 use crate::blocks::chamber::{
     cube_area, cylinder_area, energy_rate, gas_temperature, pressure_rate, wall_heat, wall_rate,
@@ -115,6 +115,9 @@ impl<S: Scalar> Plant<'_, S> {
         }
         if self.altered.flows {
             self.effect_flows(state, controls, here);
+        }
+        if let Some((InputPort::Flow(node), flow)) = here.input {
+            here.pass(Node::Ambient, node, flow);
         }
         if self.altered.inlets {
             self.inlet_flows(here);

@@ -32,7 +32,7 @@ pub use linear::{LinearModel, Side};
 pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
 pub(crate) use ports::{Acting, Place};
-pub(crate) use rates::{Controls, Line, Plant, Scratch, Simulated};
+pub(crate) use rates::{Controls, InputPort, Line, Plant, Scratch, Simulated};
 pub use rig::Rig;
 pub(crate) use switching::{Switch, Switches};
 pub(crate) use units::{BodyUnit, Group, Node, Passes, Path};

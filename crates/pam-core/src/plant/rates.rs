@@ -9,7 +9,7 @@ use super::body::Body;
 use super::layout::{Channel, Layout};
 use super::memory::Memory;
 use super::ports::{Acting, Place, Ports};
-use super::units::{GasLaw, LineUnit, Passes, Path, SupplyUnit, ValveUnit, WaveUnit};
+use super::units::{GasLaw, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit, WaveUnit};
 use super::wired::Wiring;
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
@@ -209,6 +209,15 @@ impl Altered {
     }
 }
 
+/// An input that no equation makes: what a model would need to follow a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum InputPort {
+    /// Torque on a joint [N m], force on a linear load [N].
+    Torque(usize),
+    /// Mass flow into a supply or a gas [kg/s].
+    Flow(Node),
+}
+
 /// What an energy balance needs of a gas.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Warm<S> {
@@ -251,6 +260,8 @@ pub struct Scratch<S> {
     force: Vec<S>,
     /// Contraction ratio that each group has come to, where a muscle remembers its motion.
     now: Vec<S>,
+    /// Missing input.
+    pub(crate) input: Option<(InputPort, S)>,
 }
 
 /// A supply with the values of its parameters.
@@ -436,6 +447,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
             contraction: zeros(self.wiring.groups.len()),
             force: zeros(self.wiring.groups.len()),
             now: zeros(self.wiring.groups.len()),
+            input: None,
         }
     }
 
@@ -596,6 +608,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
         let forces = self.pulls(simulated);
         if forces {
             self.mechanics(state, memory, start, true, here);
+            if let Some((InputPort::Torque(k), torque)) = here.input {
+                here.torque[k] += torque;
+            }
         } else if simulated.volumes {
             // a signal that drives the angles gives the same in two of four stages
             let motion = &state[layout.angle(0)..layout.effect(0)];

@@ -2,7 +2,7 @@
 
 use super::integrate::Rk4;
 use crate::description::dotted;
-use crate::plant::{Controls, Memory, Plant, Scratch, Simulated, Switch, Switches};
+use crate::plant::{Controls, InputPort, Memory, Plant, Scratch, Simulated, Switch, Switches};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 use std::ops::Range;
@@ -27,6 +27,8 @@ pub(crate) struct Stepper<'a, S> {
     were: Vec<f64>,
     /// Whether anybody asks what the sensors read.
     pub reads: bool,
+    /// Missing input at the beginning, the middle and the end of a step.
+    pub input: Option<(InputPort, [S; 3])>,
 }
 
 impl<'a, S: Scalar> Stepper<'a, S> {
@@ -41,6 +43,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             before,
             switches: ports.switches().then(Switches::none),
             reads: true,
+            input: None,
             scratch: plant.scratch(),
             method: Rk4::new(plant.states()),
             start: zeros(),
@@ -107,7 +110,18 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         drive: Drives<'_, 'a, S>,
     ) {
         let Self {
-            plant, scratch, method, start, end, from, remembers, stages, before, reads, ..
+            plant,
+            scratch,
+            method,
+            start,
+            end,
+            from,
+            remembers,
+            stages,
+            before,
+            reads,
+            input,
+            ..
         } = self;
         let layout = plant.rig().layout();
         if let Some(stages) = stages {
@@ -136,6 +150,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         method.step_in(state, runs, dt, |fraction, y, out| {
             let controls = at((2.0 * fraction) as usize);
             drive(plant, controls, fraction, y);
+            scratch.input = input.map(|(port, values)| (port, values[(2.0 * fraction) as usize]));
             plant.rates(y, controls, memory, start, simulated, scratch, out);
         });
         drive(plant, at(2), 1.0, state);
@@ -216,7 +231,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         drive: Drives<'_, 'a, S>,
     ) {
         self.set_stages(step, (from, until), now);
-        let Self { plant, scratch, method, start, from: muscles, stages, .. } = self;
+        let Self { plant, scratch, method, start, from: muscles, stages, input, .. } = self;
         let runs = step.runs(plant, state.len());
         let at = |stage: usize| stages.as_ref().map_or(step.held, |stages| &stages[stage]);
         let length = until - from;
@@ -227,7 +242,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
         method.step_in(state, runs, length, |fraction, y, out| {
             let controls = at((2.0 * fraction) as usize);
-            drive(plant, controls, (from + fraction * length) / step.dt, y);
+            let share = (from + fraction * length) / step.dt;
+            drive(plant, controls, share, y);
+            scratch.input =
+                input.map(|(port, [first, _, last])| (port, first + (last - first) * share));
             plant.rates(y, controls, memory, start, step.simulated, scratch, out);
         });
         drive(plant, at(2), until / step.dt, state);

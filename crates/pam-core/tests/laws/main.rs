@@ -4,6 +4,7 @@ mod batch;
 mod effect_forms;
 mod every_effect;
 mod fuzz;
+mod input;
 mod instances;
 mod joint;
 mod lanes;

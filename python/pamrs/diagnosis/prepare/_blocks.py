@@ -63,6 +63,25 @@ class Tube(NamedTuple):
     delay: float
 
 
+class Input(NamedTuple):
+    """An input of a block that nobody measured, piecewise linear in time.
+
+    Attributes
+    ----------
+    spacing : int
+        Samples from one knot to the next, from the beginning of each window.
+    heights : (k,) array
+        Its value at the knots of all windows, one after the other [N m, N or kg/s]; empty for zero.
+    """
+
+    spacing: int
+    heights: Array
+
+    def knots(self, samples: int) -> int:
+        """Knots of a window of so many samples."""
+        return -(-samples // self.spacing) + 1
+
+
 class WarmGas(NamedTuple):
     """A gas with a temperature that nobody measured.
 
@@ -717,6 +736,9 @@ class Residual:
         Temperature at which a gas without a thermometer begins [K].
     strain : float
         Squares of how far that is from the room's, in standard deviations of what it may be.
+    response : (n, k) array or None
+        Derivative of the prediction with respect to the height of an input at each knot of the
+        window that a row belongs to, start projected out.
     """
 
     value: Array
@@ -727,6 +749,7 @@ class Residual:
     starts: list[tuple[int, int, Array]] = field(default_factory=list)
     temperature: float | None = None
     strain: float = 0.0
+    response: Array | None = None
 
     def freed(self, values: Array) -> Array:
         """Values (n,) without what the starts of windows can do, 0 in unusable rows."""
@@ -1007,10 +1030,15 @@ def _own(core: _core.Rig, prepared: Prepared) -> list[str]:
 
 
 def _with_slopes(
-    block: Block, core: _core.Rig, prepared: Prepared, starts: list[int], names: list[str]
-) -> tuple[Array, Array]:
-    """A block's output over a recording (n,), and its derivatives with respect to parameters and to
-    the states in which its windows start (n, k).
+    block: Block,
+    core: _core.Rig,
+    prepared: Prepared,
+    starts: list[int],
+    names: list[str],
+    given: Input | None,
+) -> tuple[Array, Array, Array]:
+    """A block's output over a recording (n,), its derivatives with respect to parameters and to the
+    states in which its windows start (n, k), and to the knots of an input (n, m).
     """
     prediction, jacobian = core.predict(
         block.name,
@@ -1022,20 +1050,29 @@ def _with_slopes(
         begun(block, prepared, starts),
         prepared.n,
         anchors=_anchors(block, prepared, starts),
+        **({} if given is None else given._asdict()),
     )
     if jacobian is None:
         raise AssertionError("the core returns a jacobian when parameters are named")
-    return prediction, jacobian
+    ends = zip(starts, [*starts[1:], prepared.n], strict=True)
+    knots = 0 if given is None else max(given.knots(b - a) for a, b in ends)
+    split = jacobian.shape[1] - knots
+    return prediction, jacobian[:, :split], jacobian[:, split:]
 
 
 def _from_its_start(
-    block: Block, core: _core.Rig, prepared: Prepared, starts: list[int], names: list[str]
-) -> tuple[Prepared, Array, Array]:
+    block: Block,
+    core: _core.Rig,
+    prepared: Prepared,
+    starts: list[int],
+    names: list[str],
+    given: Input | None,
+) -> tuple[Prepared, Array, Array, Array]:
     """The same with a gas that begins as warm as its pressure and a prior say, and the recording
     with that temperature: steps of Gauss and Newton in it.
     """
     gas = _GasStart.of(block, prepared)
-    found = _with_slopes(block, core, prepared, starts, names)
+    found = _with_slopes(block, core, prepared, starts, names, given)
     if gas is None:
         return prepared, *found
     first = slice(starts[0], [*starts[1:], prepared.n][0])
@@ -1043,7 +1080,7 @@ def _from_its_start(
     measured = np.where(rows, prepared.recording.channels[block.channel][first], 0.0)
     begins = gas.room
     for _ in range(_START_STEPS):
-        prediction, jacobian = found
+        prediction, jacobian, _ = found
         start = np.where(rows[:, None], jacobian[first, len(names) :], 0.0)
         columns = _shown(block, start, starts[0], prepared)
         value = np.where(rows, measured - prediction[first], 0.0)
@@ -1054,11 +1091,17 @@ def _from_its_start(
             break  # so far it is linear
         begins = wanted
         prepared = replace(prepared, temperatures={block.channel: begins})
-        found = _with_slopes(block, core, prepared, starts, names)
+        found = _with_slopes(block, core, prepared, starts, names, given)
     return prepared, *found
 
 
-def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:
+def residual(
+    block: Block,
+    core: _core.Rig,
+    prepared: Prepared,
+    parameters: list[str],
+    given: Input | None = None,
+) -> Residual:
     """Predict a block's output over a recording and compare.
 
     Parameters
@@ -1071,6 +1114,8 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         The recording.
     parameters : list of str
         Dotted names for the jacobian, may be empty.
+    given : Input, optional
+        An input of the block beside what its model makes; the residual then has a `response`.
     """
     core = _there(core, prepared)
     starts = prepared.starts(block.window, block.drives)
@@ -1083,51 +1128,67 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
             core.parameter_names[0],
         )
     ]
-    prepared, prediction, jacobian = _from_its_start(block, core, prepared, starts, names)
+    prepared, prediction, jacobian, response = _from_its_start(
+        block, core, prepared, starts, names, given
+    )
     free = jacobian[:, [names.index(n) for n in own]].T.copy()
     for name, there in prepared.recording.parameters.items():
         if name in parameters:
             jacobian[:, names.index(name)] *= there.slope
-    measured = np.where(
-        prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
-    )
-    rows, noise = (
-        prepared.usable(block.channel, block.drives, starts),
-        prepared.noise[block.channel],
-    )
+    rows = prepared.usable(block.channel, block.drives, starts)
+    measured = prepared.recording.channels[block.channel]
     value = np.where(rows, measured - prediction, 0.0)
-    jacobian[~rows] = 0.0
-    shifted = prediction.copy()
-    k = len(names)
-    bases: list[tuple[int, int, Array]] = []
+    slopes = np.where(rows[:, None], np.hstack([jacobian[:, : len(names)], response]), 0.0)
+    columns = np.where(rows[:, None], jacobian[:, len(names) :], 0.0)
+    left = Residual(value, None, prediction, rows, prepared.noise[block.channel])
+    found = _freed_of_starts(block, prepared, left, starts, columns, slopes)
+    every = [*_levels(block, core, prepared, prediction), *free]
+    of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], found.starts)
+    if of_recording.size:
+        taken = of_recording @ (of_recording.T @ found.value)
+        slopes -= of_recording @ (of_recording.T @ slopes)
+        found = replace(
+            found,
+            value=found.value - taken,
+            prediction=found.prediction + taken,
+            starts=[*found.starts, (0, prepared.n, of_recording)],
+        )
+    return replace(
+        found,
+        jacobian=slopes[:, : len(parameters)] if parameters else None,
+        # a whole recording is shown from its measured start, a window from the one that suits best
+        prediction=prediction if block.window is None else found.prediction,
+        response=None if given is None else slopes[:, len(names) :],
+    )
+
+
+def _freed_of_starts(
+    block: Block,
+    prepared: Prepared,
+    left: Residual,
+    starts: list[int],
+    columns: Array,
+    slopes: Array,
+) -> Residual:
+    """A residual freed of where its windows start, and so are `slopes` (n, k), in place; windows
+    with too few rows are left out. ``columns`` are what the start of each window does.
+    """
+    value, rows, shifted = left.value, left.rows, left.prediction.copy()
     gas = _GasStart.of(block, prepared)
     begins = prepared.temperatures.get(block.channel, gas.room) if gas else 0.0
-    begun_at, strain = (begins if gas else None), 0.0
+    temperature, strain = (begins if gas else None), 0.0
+    bases: list[tuple[int, int, Array]] = []
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
-        slopes = jacobian[a:b, :k]
-        start = _shown(block, jacobian[a:b, k:], a, prepared)
+        start = _shown(block, columns[a:b], a, prepared)
         if np.count_nonzero(rows[a:b]) < WINDOW_SAMPLES_PER_STATE * start.shape[1]:
-            rows[a:b] = False
-            value[a:b] = 0.0
-            slopes[:] = 0.0
+            rows[a:b], value[a:b], slopes[a:b] = False, 0.0, 0.0
             continue
-        own_gas = gas if a == starts[0] and start.shape[1] > 1 else None
-        freed = _freed_window(start, value[a:b], noise, own_gas, begins)
+        own = gas if a == starts[0] and start.shape[1] > 1 else None
+        freed = _freed_window(start, value[a:b], left.noise, own, begins)
         bases.append((a, b, freed.basis))
         value[a:b] -= freed.taken
         shifted[a:b] += freed.taken
-        slopes -= freed.basis @ (freed.basis.T @ slopes)
+        slopes[a:b] -= freed.basis @ (freed.basis.T @ slopes[a:b])
         strain += freed.strain
-        begun_at = freed.begins or begun_at
-    every = [*_levels(block, core, prepared, prediction), *free]
-    of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], bases)
-    if of_recording.size:
-        correction = of_recording @ (of_recording.T @ value)
-        value -= correction
-        shifted += correction
-        jacobian[:, :k] -= of_recording @ (of_recording.T @ jacobian[:, :k])
-        bases.append((0, prepared.n, of_recording))
-    jac = jacobian[:, : len(parameters)] if parameters else None
-    # a whole recording is shown from its measured start; a window from the start that suits it best
-    shown = prediction if block.window is None else shifted
-    return Residual(value, jac, shown, rows, noise, bases, begun_at, strain)
+        temperature = freed.begins or temperature
+    return replace(left, prediction=shifted, starts=bases, temperature=temperature, strain=strain)
