@@ -187,6 +187,9 @@ def _judged(
     ]
     if known is None or not doubtful:
         return run
+    if _is_ahead(final, run.seconds):
+        note = "a clock ahead of its commands cannot be simulated: what is missed says nothing"
+        return replace(run, note=f"{run.note}; {note}" if run.note else note)
     logged, note = _as_logged(prepared.recording), run.note
     if len(logged) > _OFF_SAMPLES:
         logged = logged.between(stop=float(logged.time[_OFF_SAMPLES]))
@@ -196,6 +199,12 @@ def _judged(
     off = {name for name in doubtful if left.get(name, math.inf) > _OFF_NOISES}
     channels = {n: replace(e, off=n in off) for n, e in run.channels.items()}
     return replace(run, channels=channels, note=note)
+
+
+def _is_ahead(rig: Rig, seconds: float) -> bool:
+    """Whether a rig has a clock that is ahead of its commands in a recording of some length."""
+    clocks = [effect["parameters"] for effect in rig.effects if effect["id"] == "clock_skew"]
+    return any(min(p["offset"], p["offset"] + p["rate"] * seconds) < 0.0 for p in clocks)
 
 
 def _left(
