@@ -93,7 +93,7 @@ def test_the_report_draws_them_and_json_does_not_hold_them(speeds) -> None:
     assert "the other way round" in page
     written = json.loads(found.to_json())
     jsonschema.validate(written, schema())
-    keys = {"text", "excitation", "expected_information_bits", "pairs"}
+    keys = {"text", "instruction", "excitation", "expected_information_bits", "pairs"}
     assert set(written["next_experiment"]) == keys
 
 

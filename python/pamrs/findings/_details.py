@@ -190,6 +190,8 @@ class NextExperiment(Entry):
         What tells each two hypotheses that are left open from each other.
     protocol : Protocol or None
         The commands; None where nothing is sent, or no experiment is proposed.
+    instruction : str
+        What to record, whole; empty where nothing is to be recorded.
     """
 
     text: str = ""
@@ -199,6 +201,10 @@ class NextExperiment(Entry):
     curves: Curves | None = field(default=None, metadata=told(json=False))
     pairs: list[PairExperiment] = field(default_factory=list)
     protocol: Protocol | None = field(default=None, metadata=told(json=False))
+    instruction: str = field(
+        default="",
+        metadata=told("what to record; empty where nothing is to be recorded", required=False),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -245,6 +245,8 @@ class BlockVerdict(Entry):
         Of a block that is not judged, what of the rig it stands for, in words.
     reason : str
         Why it is not judged; empty where it is.
+    block : str or None
+        Which of its blocks has the mismatch, or the value that is wrong; None where nothing is.
     """
 
     blocks: list[str] = field(metadata=told("names of its blocks"))
@@ -267,6 +269,14 @@ class BlockVerdict(Entry):
     )
     reason: str = field(
         default="", metadata=told("why it is not judged; empty where it is", required=False)
+    )
+    block: str | None = field(
+        default=None,
+        metadata=told(
+            "which of its blocks has the mismatch, or the value that is wrong; null where nothing "
+            "is",
+            required=False,
+        ),
     )
 
 
@@ -543,6 +553,11 @@ class ParameterFound(Entry):
     unit: str
     moved_sigmas: float
     identifiable: bool | None = field(default=None, metadata=told(optional=True))
+
+    @property
+    def known(self) -> bool:
+        """Whether the recordings determine how far it moved."""
+        return self.identifiable is not False and math.isfinite(self.moved_sigmas)
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,7 +59,8 @@ def one_page_pdf(diagnosis: Findings) -> bytes:
         parts = figure.subfigures(4, 1, height_ratios=heights, squeeze=False)[:, 0]
         top, chain, curves, bars = parts
         told = [f"{value} – {what}" for value, what in story.facts(diagnosis)]
-        lines = [textwrap.fill(text, 100) for text in [*told, *story.to_do(diagnosis)]]
+        told += [*story.to_do(diagnosis), story.next_to_do(diagnosis)]
+        lines = [textwrap.fill(text, 100) for text in filter(None, told)]
         title = textwrap.fill(story.title(diagnosis), 60)
         style: dict[str, Any] = {"ha": "left", "va": "top"}
         top.text(0.05, 0.9, title, size=15, fontweight="bold", **style)
