@@ -45,18 +45,18 @@ def verdict(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) 
     that is not settled, and what was not judged; ``forms`` say what a mismatch without a name is a
     function of, if that was ``sought``.
     """
-    answer = diagnosis.answer
+    answer, first = diagnosis.answer, diagnosis.answer.parts[:1]
     without = [p for p in answer.parts if p.group.verdict == "unlisted"]
     main = [f"{missed_sentence(diagnosis)}." if answer.missed else ""]
-    if not answer.parts and not answer.missed:
+    if not first and not answer.missed:
         main.append(_healthy(diagnosis))
     main += [_effects(diagnosis, case), _mistaken(diagnosis)]
     unexplained = _without_name(diagnosis, without) if without else ""
-    if answer.parts[:1] == without[:1]:  # what has no name leads
+    if first and first == without[:1]:  # what has no name leads
         main[1:1], unexplained = [unexplained], ""
     healthy = [p for p in answer.parts if not p.names and p not in without]
     main += [_may_be_complete(part) for part in healthy]
-    main += [diagnosis.where.text] if healthy[:1] == answer.parts[:1] else []
+    main += [diagnosis.where.text] if first and first == healthy[:1] else []
     main.append(unsettled_sentence(diagnosis))
     form = _form(diagnosis, case, forms, sought=sought) if without else ""
     ends = [f"{capital(words)}." for words in not_judged_words(diagnosis)]
