@@ -113,7 +113,7 @@ def _healthy(diagnosis: Findings) -> str:
     how = words.down_to(diagnosis)
     if diagnosis.answer.verdict == "parameters":
         by = "values inside their tolerances explain the difference"
-        return f"No physics is missing{place}: {by}" + f" {how}" * ("noise level" not in how)
+        return f"No physics is missing{place}: {by}" + f" {how}" * (how != words.DOWN_TO_NOISE)
     return f"Nothing is missing{place}: the model explains these recordings {how}"
 
 

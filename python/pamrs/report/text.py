@@ -635,6 +635,10 @@ def _answer(names: list[str], chance: float = math.nan) -> str:
     return f"{text} ({format_probability(chance)})" if is_number(chance) else text
 
 
+DOWN_TO_NOISE = "down to the noise level"
+"""How closely a model explains recordings of which only noise is left."""
+
+
 def down_to(diagnosis: Findings) -> str:
     """How closely a model without anything missing explains the recordings: ``down to the noise
     level``, or to within the error that is taken for its own where it misses more than noise.
@@ -647,7 +651,7 @@ def down_to(diagnosis: Findings) -> str:
         and (found := miss(diagnosis, own.channel, "after"))
     ]
     if not missed:
-        return "down to the noise level"
+        return DOWN_TO_NOISE
     _, own, left, found = max(missed, key=lambda each: each[0])
     if left == "more":
         return f"to within {found} of {spoken_name(own.channel)}"
