@@ -23,7 +23,6 @@ WORDS = {
     "parameters": "parameter values that are off",
     "none": "nothing missing",
 }
-EVEN = 0.5
 ROOT = Path(__file__).parents[1]
 
 
@@ -43,10 +42,9 @@ def judgement(key: dict[str, Any], result: dict[str, Any]) -> str:
     right = score(key, result)[2]
     truth = sorted(key["effects"]) or [key["verdict"]]
     named = sorted(effect["id"] for effect in result["effects"])
-    answer = named if result["verdict"] == "effects" else [result["verdict"]]
+    first = named if result["verdict"] == "effects" else [result["verdict"]]
     sets = [sorted(names) for names in result["ambiguity"]]
-    rivals = [names for names in sets if names != answer]
-    chances = [effect["probability"] for effect in result["effects"] if named == answer]
+    rivals = [names for names in sets if names != first]
     if not right:
         held = truth in sets
         return "The first answer is NOT the truth this time" + (
@@ -58,8 +56,11 @@ def judgement(key: dict[str, Any], result: dict[str, Any]) -> str:
         others = " and ".join(" + ".join(WORDS.get(name, name) for name in s) for s in rivals)
         stand = "stands" if len(rivals) == 1 else "stand"
         return f"The verdict is right, but not settled: {others} also {stand}."
-    if any(chance < EVEN for chance in chances):
-        return f"The verdict is right, but not settled: its probability is {min(chances):.2f}."
+    answer = result["answer"]
+    if not answer["settled"]:
+        why = f"its probability is {answer['probability']:.2f}"
+        why = "the model still misses too much" if answer["missed"] else why
+        return f"The verdict is right, but not settled: {why}."
     return "The verdict is right."
 
 

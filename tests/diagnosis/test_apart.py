@@ -13,7 +13,6 @@ from pamrs.diagnosis.evidence import (
     BlockGroup,
     Candidate,
     Weighing,
-    case_verdict,
     judge,
     weigh,
 )
@@ -22,6 +21,7 @@ from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.diagnosis.search._hypotheses import _split_by_names
 from pamrs.effects import UNLISTED, Hypothesis
+from pamrs.findings import case_verdict
 from pamrs.simulation import core_rig
 from tests.diagnosis.likelihoods import made_up
 from tests.diagnosis.terms import terms
@@ -78,7 +78,7 @@ def test_a_leak_of_the_tank_is_named_beside_a_chamber_without_a_name() -> None:
         ("effects", terms("supply_leak")),
         ("unlisted", ()),
     ]
-    assert case_verdict(judged) == "effects"
+    assert case_verdict(j.verdict for j in judged) == "effects"
     # one fit for both, so that the model has the tank's parameters beside the leak
     assert chamber.candidates[0].fit is tank.candidates[1].fit
 

@@ -91,6 +91,7 @@ def test_a_diagnosis_says_what_it_did_not_judge() -> None:
 
     found = diagnosed(RIG, lift)
     assert found.verdict == "none"
+    assert not found.answer.missed  # the whole rig is not judged by it either
     (told,) = (text for text in found.warnings if "were not judged" in text)
     assert "block chamber: the first 0." in told
     assert "of r0, " in told

@@ -102,6 +102,19 @@ def test_a_gas_with_a_temperature_is_judged_as_others(
     assert errors[0.0] < 500.0  # 400 Pa are noise
 
 
+def test_nothing_is_said_of_a_clock_that_is_ahead_of_its_commands() -> None:
+    """No simulation answers a command that is still to come."""
+    rig = parse_rig(WARM)
+    true = rig.with_effect("leak_muscle", {"conductance": 3e-8})
+    told = _free_run.KnownValues(("chamber.dead_volume",), np.array([5e-4]), np.array([[5e-6]]))
+    problem = problem_of(rig, [vented(true, "held_out", 2)])
+    for offset, off in ((0.04, True), (-0.04, False)):
+        late = rig.with_effect("clock_skew", {"offset": offset})
+        (run,), *_ = ran(problem, rig, late, known=told)
+        assert run.channels["muscle_pressure"].off is off
+        assert ("ahead of its commands" in run.note) is not off
+
+
 def test_of_a_long_log_the_first_part_is_asked_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = parse_rig(WARM)
     true = rig.with_effect("leak_muscle", {"conductance": 3e-8})

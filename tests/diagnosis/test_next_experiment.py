@@ -298,7 +298,7 @@ def test_an_effect_and_parameters_that_moved_are_simulated_as_a_pair() -> None:
     assert pair.noises is not None
     # a leak of no size is the other model: what tells is what that one misses
     assert pair.noises > 1.0
-    assert "parameters inside their tolerances" in pair.text
+    assert "parameters in tolerance" in pair.text
     assert 0.0 < found.expected_information_bits < entropy([0.6, 0.4])
 
 

@@ -20,7 +20,7 @@ from pamrs.diagnosis.next_experiment import measurable
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import CATALOGUE, Term, find_parameter
-from pamrs.findings import BlockVerdict
+from pamrs.findings import BlockVerdict, Part
 from pamrs.recordings import Recording
 from pamrs.report.story import headline
 from pamrs.report.text import label, told_apart
@@ -114,7 +114,8 @@ def test_names_with_a_place() -> None:
     assert not flexor.excluded_by([extensor, Term("valve_area")])
     both = label("leak_muscle@flexor+valve_area")
     assert both == f"{label('leak_muscle')} at flexor + valve area"
-    told = told_apart([["leak_muscle"], ["leak_muscle@flexor"]], {})
+    left = tuple(((name,), float("nan")) for name in ("leak_muscle", "leak_muscle@flexor"))
+    told = told_apart(Part(BlockVerdict([], "effects", {}, [], [], []), None, left, False, False))
     assert "at every chamber from" in told
     assert told.endswith("at flexor")
 

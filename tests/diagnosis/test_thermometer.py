@@ -153,7 +153,7 @@ def test_a_log_may_begin_while_the_gas_is_warm() -> None:
     assert found_in(rig, recordings).verdict == "none"
     begun = found_in(rig, bare(recordings))
     assert begun.verdict == "none"
-    assert not begun.off
+    assert not begun.answer.missed
 
 
 def test_holes_of_either_sensor_are_not_judged() -> None:

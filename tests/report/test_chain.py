@@ -90,7 +90,12 @@ def test_measured_channels_are_marked_and_the_located_block_is_lit() -> None:
         verdict("chamber", "muscle_pressure", "effects", 12.0),
         verdict("arm", "joint_angle"),
     ]
-    svg = chain_svg(found(pamrs.rigs.shoulder(), "chamber", blocks)) or ""
+    errors = {
+        "muscle_pressure": synthetic.fit_entry(3e5),
+        "joint_angle": dict.fromkeys(("noise", "before", "refit", "after"), 0.001),
+    }
+    fit = {"channels": errors, "held_out": {}, "gap_closed": None}
+    svg = chain_svg(found(pamrs.rigs.shoulder(), "chamber", blocks, fit=fit)) or ""
     assert svg.count('stroke-width="2.4"') == 1  # one frame is lit
     assert "misses 6.0 × noise" in svg  # the error of the channel in the table of errors
     assert svg.count("fits to the noise") == 2
@@ -121,9 +126,9 @@ def test_a_wrong_parameter_stands_at_its_block() -> None:
         probability=0.97,
         held_out={},
     )
-    rig = pamrs.rigs.shoulder()
-    made = found(rig, "chamber", [], verdict="parameters", effects=[], wrong_parameters=[entry])
-    assert "wrong: dead volume" in (chain_svg(made) or "")
+    more = {"wrong_parameters": [entry], "probabilities": {entry.name: 0.97}, "effects": []}
+    made = found(pamrs.rigs.shoulder(), "chamber", [], verdict="parameters", **more)
+    assert ">wrong: dead volume" in (chain_svg(made) or "")
 
 
 def test_without_a_rig_there_is_no_drawing() -> None:

@@ -50,16 +50,6 @@ def test_page_is_self_contained(make, tmp_path: Path) -> None:
     assert len(html) < 3_000_000
 
 
-@pytest.mark.parametrize(
-    ("verdict", "ambiguity", "words"),
-    rows_of(__file__, "a_set_with_parameters_in_it_is_no_missing_physics_yet"),
-)
-def test_a_set_with_parameters_in_it_is_no_missing_physics_yet(
-    verdict: str, ambiguity: list[list[str]], words: str
-) -> None:
-    assert words in replace(synthetic.diagnosis(), verdict=verdict, ambiguity=ambiguity).headline
-
-
 def test_the_headline_names_what_the_model_holds_already() -> None:
     term = BudgetTerm("chamber", "held", "leak_muscle", "", 0.9, [0.8, 1.0], None, 1.0, 300.0, "Pa")
     found = replace(synthetic.nothing(), budget=[term])
@@ -109,18 +99,26 @@ def visible(html: str) -> list[str]:
     return re.sub(r"<[^>]*>", " ", left).split()
 
 
+LONG = (
+    "Drive the muscle pressure in nested triangles around 1.95 bar, of ±1.17, ±0.7 and ±0.35 bar, "
+    "first with a period of 12 s, then of 1.2 s, with one more channel: supply pressure."
+)
+
+
 @pytest.mark.parametrize(
     "changes",
     [
         {},
         {"ambiguity": [["leak_muscle"], ["heat_transfer"], ["unlisted"]]},
         {"verdict": "unlisted", "effects": [], "warnings": ["long " * 60] * 9},
-        {"next_experiment": {"text": "Fill and hold, " * 90, "excitation": {"kind": "hold"}}},
+        {"next_experiment": {"text": "Fill and hold, " * 90, "instruction": LONG}},
     ],
 )
 def test_little_is_to_be_read_before_details(changes) -> None:
     found = synthetic.diagnosis(**changes, traces=synthetic.diagnosis().traces[:1])
-    assert 20 < len(visible(render_html(found))) <= 150
+    seen = visible(render_html(found))
+    assert 20 < len(seen) <= 150
+    assert found.next_experiment.instruction in " ".join(seen)  # whole
     assert len(story.title(found).split()) <= story.LONGEST
 
 
@@ -235,13 +233,16 @@ def test_decimation_keeps_extremes_and_gaps() -> None:
 
 def test_the_final_model_is_called_what_it_is(page: str) -> None:
     named = synthetic.diagnosis()
-    assert words.model_name(named) == "mended model"
     bare = {"effects": [], "wrong_parameters": [], "unexplained": []}
-    refitted = synthetic.diagnosis(verdict="unlisted", traces=[], **bare)
-    assert words.model_name(refitted) == "refitted model"
+    refitted = synthetic.diagnosis(verdict="unlisted", **bare)
     nothing = synthetic.diagnosis(verdict="none", **bare)
-    assert words.model_name(nothing) == "your model"
-    assert "<th>mended model</th>" in page
+    told = [found.answer.model for found in (named, refitted, nothing)]
+    assert told == ["mended model", "refitted model", "your model"]
+    for found, columns in ((named, 4), (refitted, 3), (nothing, 3)):
+        heads = [*words.shown_stages(found).values()]
+        assert len({*heads}) == len(heads) == columns
+        assert all(head in found.summary() for head in heads)
+    assert "<th>mended model</th>" in render_html(named)
     assert "<th>mended model</th>" not in render_html(refitted)
 
 

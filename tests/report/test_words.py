@@ -29,14 +29,20 @@ def stages(noises: float, *, more: bool) -> MismatchStages:
     return MismatchStages(size, size, size)
 
 
-def group(block: str, channel: str, chance: float, **named: list[str]) -> BlockVerdict:
-    """A group of one block, which keeps noise alone with the final model."""
+def group(
+    block: str, channel: str, chance: float, verdict: str = "unlisted", **named: list[str]
+) -> BlockVerdict:
+    """A group of one block, which keeps noise alone with the final model; of the verdict where it
+    names nothing.
+    """
     names = [*named.get("effects", []), *named.get("wrong", [])]
+    verdict = "effects" if named.get("effects") else "parameters" if names else verdict
+    rest = "none" if verdict == "unlisted" else "unlisted"
     mismatch = BlockMismatch(block, channel, "rad", stages(0.5, more=True), stages(0.4, more=False))
     return BlockVerdict(
         blocks=[block],
-        verdict="effects",
-        probabilities={"+".join(names): chance, "unlisted": 1.0 - chance},
+        verdict=verdict,
+        probabilities={"+".join(names or [verdict]): chance, rest: 1.0 - chance},
         effects=named.get("effects", []),
         wrong_parameters=named.get("wrong", []),
         ambiguity=[],
@@ -65,10 +71,10 @@ def test_one_cause_that_two_groups_see_is_told_once() -> None:
     assert found.headline == (
         "The model leaves out encoder error in the arm (0.98) and in the chamber (0.93)"
     )
-    assert words.name_chance(found, found.effects[0]) == "0.93 in the chamber, 0.98 in the arm"
+    assert words.name_chance(found, "encoder_error") == "0.98 in the arm, 0.93 in the chamber"
     # another name is told by itself
     other = group("arm", "joint_angle", 0.9, effects=["muscle_creep"])
-    told = "muscle creep in the arm (0.90) and encoder error in the chamber (0.93)"
+    told = "encoder error in the chamber (0.93) and muscle creep in the arm (0.90)"
     assert seen(one, other).headline == f"The model leaves out {told}"
 
 
@@ -78,7 +84,8 @@ def test_a_settled_name_leads_the_title_whatever_else_is_located() -> None:
     left = replace(creep, effects=[], ambiguity=[["unlisted"], ["muscle_creep"]])
     found = seen(sure, left, verdict="effects")
     assert story.title(found) == (
-        "The model of the chamber leaves out a leak: muscle leak (0.93); something else in the arm"
+        "The model of the chamber leaves out a leak: muscle leak (0.93); something else may act "
+        "in the arm"
     )
     assert story.facts(found)[0][0] == "chamber"
     names = [row.name for row in story.rivals(found)]
@@ -90,11 +97,13 @@ def test_noise_that_is_left_is_not_called_unexplained(tmp_path: Any) -> None:
     terms = [term("parameters", 0.99, 0.1), term("unexplained", 0.01, 0.029)]
     found = seen(group("arm", "joint_angle", 0.9, effects=["muscle_creep"]), budget=terms)
     ((block, told),) = words.budget_sentences(found)
-    assert (block, words.noise_alone(found, "arm")) == ("arm", True)
+    assert (block, words.left_in(found, "arm")) == ("arm", "noise")
     assert told == "parameters inside tolerance 99 % (99 to 99); only noise is left."
     assert "unexplained" not in words.budget_sentences(found)[0][1]
     # where it is more than noise, or a result does not say, the size is told
     assert "1 % unexplained" in words.budget_sentence(terms)
+    inside = words.budget_sentence(terms, "error")
+    assert inside.endswith("what is left is inside the usual error of the model.")
 
 
 def test_shares_are_explained_where_they_can_be_misread() -> None:
@@ -170,15 +179,15 @@ def test_conditions_count_nothing_twice() -> None:
 
 def test_a_miss_inside_the_usual_error_of_a_model_is_said_so() -> None:
     """The arm misses ten noises where its model is usually off by twelve."""
-    own = group("arm", "joint_angle", 0.9)
+    own = group("arm", "joint_angle", 0.9, "none")
     (mismatch,) = own.mismatch
     errors = {"joint_angle": dict(zip(KEYS, (0.001, 0.02, 0.01, 0.01), strict=True))}
     fit = {"channels": errors, "held_out": {}, "gap_closed": None}
     for error, told in (
         (0.012, "to within its usual error (joint angle 0.57 deg of 0.69 deg)"),
-        (0.0, "down to the noise level"),
+        (0.0046, "to within 10 noise levels (0.57 deg) of joint angle"),
     ):
-        quiet = replace(own, verdict="none", mismatch=[replace(mismatch, model_error=error)])
+        quiet = replace(own, mismatch=[replace(mismatch, model_error=error)])
         found = synthetic.diagnosis(
             blocks=[quiet], verdict="none", effects=[], probabilities={"none": 1.0}, fit=fit
         )

@@ -56,6 +56,16 @@ def test_a_recording_of_named_blocks_is_replayed(tmp_path: Path) -> None:
         replay(rig, pamrs.load_recording(some))
 
 
+def test_a_measured_pressure_lifts_the_mass_where_nothing_feeds_the_muscle(tmp_path: Path) -> None:
+    whole = pamrs.rigs.named("hanging_mass")
+    run = pamrs.simulate(whole, wave(300) + 0.2, sample_time=0.01)
+    tables = [t for t in whole.to_toml_text().split("\n[") if not t.startswith(("supply", "valve"))]
+    recording = pamrs.load_recording(write(tmp_path / "run.csv", run, "muscle_pressure", "length"))
+    again = replay(parse_rig("\n[".join(tables)), recording)
+    assert differences(again, recording)["length"] < 1e-4
+    assert np.ptp(run["length"]) > 0.01
+
+
 @pytest.mark.parametrize("alike", [True, False])
 def test_a_gas_may_begin_warm_or_cold(alike: bool) -> None:
     """The second half of a run of two gases, from their pressures and temperatures alone."""

@@ -319,22 +319,22 @@ def _physics(
     say("putting the answer together", _JUDGED[1])
     unjudged = [*unjudged, *_lost(every, inner)]
     found = conclude(case.rig, inner, outer, groups)
+    diagnosis = assemble(case, inner, outer, groups, found, unjudged)
     proposal = inner.losses.part(
         "the next experiment",
         lambda: next_to_record(
-            found.models.verdict,
+            diagnosis,
             found.ambiguity,
             found.hypotheses(inner),
             case.rig,
             found.judged,
             inner,
             outer,
-            found.off,
         ),
         NextExperiment(""),
     )
-    diagnosis = assemble(case, inner, outer, groups, found, proposal, unjudged)
-    diagnosis = replace(diagnosis, warnings=[*slack, *diagnosis.warnings])
+    warnings = [*slack, *diagnosis.warnings]
+    diagnosis = replace(diagnosis, next_experiment=proposal, warnings=warnings)
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         told = (

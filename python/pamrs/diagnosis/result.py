@@ -48,6 +48,12 @@ class Diagnosis(View, Findings):
     ----------
     case : str
         Name of the case.
+    answer : Answer
+        What all of the rest comes to, decided once: ``verdict``, ``settled`` and ``why`` not
+        (``missed``, ``sets``, ``probability``, ``units``), the ``block``, the ``names`` that lead
+        with their ``probability``, and what the final ``model`` still has ``missed`` by more than
+        five noise levels beyond noise and its own error (``block``, None for the whole rig,
+        ``channel``, ``unit``, ``size``, ``before``, ``noises``, ``beyond``).
     verdict : str
         ``none``, ``parameters``, ``effects``, ``unlisted``, or ``units`` (channels are read wrong,
         and nothing else is judged).
@@ -84,9 +90,9 @@ class Diagnosis(View, Findings):
         ``gap_closed``.
     next_experiment : NextExperiment
         ``text``, ``excitation``, ``expected_information_bits``, ``pairs`` (what tells each two
-        hypotheses that are left open apart: ``between``, ``text``, ``experiment``, ``noises``), and
-        ``ranking``, ``curves`` and ``protocol`` (its commands, ``protocol.to_csv()``) of what
-        was simulated.
+        hypotheses that are left open apart: ``between``, ``text``, ``experiment``, ``noises``),
+        ``instruction`` (what to record, alone), and ``ranking``, ``curves`` and ``protocol`` (its
+        commands, ``protocol.to_csv()``) of what was simulated.
     data : list of RecordingUsed
         ``recording``, ``role``, ``source``, ``samples``, ``sample_time``, ``averaged`` (recorded
         samples in each), ``used`` channels, ``unused`` {channel: why} and ``masked`` {channel:
@@ -180,7 +186,7 @@ class Diagnosis(View, Findings):
         ]
         found = {name: to_plain(getattr(self, name)) for name in own}
         told = {"settings": self.settings.to_dict(), "version": __version__}
-        return {"schema": SCHEMA, **found, **told}
+        return {"schema": SCHEMA, "answer": to_plain(self.answer), **found, **told}
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """Return the result as strict JSON (schema `pamrs.diagnosis/2`).

@@ -1,16 +1,33 @@
 """What a diagnosis found, as types: what `pamrs.diagnosis` fills, and `pamrs.report` shows.
 
-Entries have attributes and can be read like dictionaries. This package computes nothing; it lies
-below reports and diagnosis, so that neither has to know the other to name what lies between them.
+Entries have attributes and can be read like dictionaries. This package lies below reports and
+diagnosis, so that neither has to know the other to name what lies between them. It decides one
+thing, once: the answer that all of it comes to (`Answer`).
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
-`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`,
-`SETTLED`; `channels_off` (of free runs); `compare_results` of two results, and `Compared`;
-`to_plain`, by which they become JSON, and `fields_from`, which reads it.
+`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
+`Answer` with its `Part` and `Missed`, and what decides it (`case_verdict`, `beyond`, `left_of`,
+`chance_of`, `SETTLED`); `compare_results` of two results, and `Compared`; `to_plain`, by which they
+become JSON, and `fields_from`, which reads it.
 """
 
 from __future__ import annotations
 
+from pamrs.findings._answer import (
+    MENDED,
+    MOST_MISSED,
+    NOISE_LEVELS,
+    REFITTED,
+    SETTLED,
+    YOURS,
+    Answer,
+    Missed,
+    Part,
+    beyond,
+    case_verdict,
+    chance_of,
+    left_of,
+)
 from pamrs.findings._compare import Compared, compare_results
 from pamrs.findings._details import (
     BlockResidual,
@@ -50,14 +67,20 @@ from pamrs.findings._entries import (
     WrongParameter,
 )
 from pamrs.findings._entry import Entry, fields_from, to_plain
-from pamrs.findings._findings import SETTLED, Findings, channels_off
+from pamrs.findings._findings import Findings
 from pamrs.findings._trace import ModelFile, Trace
 
 __all__ = [
     "HEALTHY",
+    "MENDED",
+    "MOST_MISSED",
+    "NOISE_LEVELS",
     "NOT_JUDGED",
+    "REFITTED",
     "SETTLED",
     "VERDICTS",
+    "YOURS",
+    "Answer",
     "BlockMismatch",
     "BlockResidual",
     "BlockVerdict",
@@ -79,9 +102,11 @@ __all__ = [
     "MismatchSize",
     "MismatchStages",
     "Misread",
+    "Missed",
     "ModelFile",
     "NextExperiment",
     "PairExperiment",
+    "Part",
     "Protocol",
     "ParameterFound",
     "RankedExperiment",
@@ -93,8 +118,11 @@ __all__ = [
     "Unexplained",
     "Where",
     "WrongParameter",
-    "channels_off",
+    "beyond",
+    "case_verdict",
+    "chance_of",
     "compare_results",
     "fields_from",
+    "left_of",
     "to_plain",
 ]

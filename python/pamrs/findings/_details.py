@@ -189,6 +189,8 @@ class NextExperiment(Entry):
         What tells each two hypotheses that are left open from each other.
     protocol : Protocol or None
         The commands; None where nothing is sent, or no experiment is proposed.
+    instruction : str
+        What to record, whole; empty where nothing is to be recorded.
     """
 
     text: str = ""
@@ -198,6 +200,7 @@ class NextExperiment(Entry):
     curves: Curves | None = field(default=None, metadata=NOT_WRITTEN)
     pairs: list[PairExperiment] = field(default_factory=list)
     protocol: Protocol | None = field(default=None, metadata=NOT_WRITTEN)
+    instruction: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -211,6 +211,8 @@ class BlockVerdict(Entry):
         Of a block that is not judged, what of the rig it stands for, in words.
     reason : str
         Why it is not judged; empty where it is.
+    block : str or None
+        Which of its blocks has the mismatch, or the value that is wrong; None where nothing is.
     """
 
     blocks: list[str]
@@ -222,6 +224,7 @@ class BlockVerdict(Entry):
     mismatch: list[BlockMismatch] = field(default_factory=list)
     covers: str = ""
     reason: str = ""
+    block: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -463,6 +466,11 @@ class ParameterFound(Entry):
     unit: str
     moved_sigmas: float
     identifiable: bool | None = field(default=None, metadata=OPTIONAL)
+
+    @property
+    def known(self) -> bool:
+        """Whether the recordings determine how far it moved."""
+        return self.identifiable is not False and math.isfinite(self.moved_sigmas)
 
 
 @dataclass(frozen=True, eq=False)

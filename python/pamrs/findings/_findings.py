@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass, field
-from typing import Final
+from functools import cached_property
 
+from pamrs.findings._answer import REFITTED, SETTLED, Answer, answer_of
 from pamrs.findings._details import (
     BlockResidual,
     Considered,
@@ -19,11 +20,11 @@ from pamrs.findings._entries import (
     VERDICTS,
     BlockVerdict,
     BudgetTerm,
+    ChannelError,
     EffectFound,
     Faulty,
     FitErrors,
     FreeRun,
-    FreeRunError,
     Misread,
     ParameterFound,
     Unexplained,
@@ -32,22 +33,6 @@ from pamrs.findings._entries import (
 )
 from pamrs.findings._entry import NOT_WRITTEN
 from pamrs.findings._trace import ModelFile, Trace
-
-SETTLED: Final = 0.75
-"""Probability from which an answer is settled, where no setting says another one."""
-
-
-def channels_off(runs: Sequence[FreeRun]) -> dict[str, FreeRunError]:
-    """Channels that free runs miss by more than noise and what is known of the values explain, the
-    worst recording of each, by channel; the worst first.
-    """
-    found: dict[str, FreeRunError] = {}
-    for run in runs:
-        for channel, error in run.channels.items():
-            worst = found.get(channel)
-            if error.off and (worst is None or error.noises > worst.noises):
-                found[channel] = error
-    return dict(sorted(found.items(), key=lambda item: -item[1].noises))
 
 
 @dataclass(frozen=True)
@@ -172,12 +157,29 @@ class Findings:
         """Probability from which an answer is settled."""
         return SETTLED
 
-    @property
-    def off(self) -> dict[str, FreeRunError]:
-        """Channels that the whole rig misses from its commands alone by more than noise and the
-        uncertainty of its values explain, the worst recording of each, by channel.
-        """
-        return channels_off(self.free_run or [])
+    @cached_property
+    def answer(self) -> Answer:
+        """What all of this comes to, decided once: texts, tables and pictures take it from here."""
+        if self.misread:
+            return Answer("units", False, "units", None, [], math.nan, [], REFITTED, [], [])
+        block = self.where.block
+        whole = BlockVerdict(  # of a result that does not tell its groups apart
+            blocks=[block] if block else [],
+            verdict=self.verdict,
+            probabilities=self.probabilities,
+            effects=[e.term for e in self.effects] if self.verdict == "effects" else [],
+            wrong_parameters=[w.name for w in self.wrong_parameters],
+            ambiguity=self.ambiguity,
+        )
+        return answer_of(
+            self.judged or [whole],
+            self.proven,
+            self.free_run or [],
+            self.probabilities,
+            {w.name: w.block for w in self.wrong_parameters},
+            enough=self.settled,
+            form=any(kept.form for kept in self.unexplained),
+        )
 
     @property
     def judged(self) -> list[BlockVerdict]:
@@ -193,6 +195,11 @@ class Findings:
     def model(self) -> str:
         """The model with the effect, as TOML; empty when there is no model."""
         return "" if self.rig is None else self.rig.to_toml_text()
+
+    @property
+    def proven(self) -> dict[str, ChannelError]:
+        """Errors that the answer is proven by: held-out ones where there are any."""
+        return self.fit.held_out or self.fit.channels
 
     @property
     def proof(self) -> str:

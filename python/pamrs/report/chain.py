@@ -18,7 +18,7 @@ from pamrs.effects import EFFECTS
 from pamrs.findings import BlockMismatch, Findings
 from pamrs.report.figures import COLOURS
 from pamrs.report.page import render_page
-from pamrs.report.text import format_number, label, miss
+from pamrs.report.text import format_number, label, left_in, miss
 from pamrs.rig import Rig
 
 COLUMN, BOX, LINE, PAD, GAP = 186.0, 134.0, 17.0, 14.0, 34.0
@@ -253,9 +253,9 @@ def _middle(rows: list[float], otherwise: float) -> float:
 
 def _mark(parts: dict[str, _Part], diagnosis: Findings) -> None:
     """What was found, at the blocks that it acts in."""
-    named = diagnosis.effects if diagnosis.verdict == "effects" else []
-    open_ = {n for b in diagnosis.judged if len(b.ambiguity) > 1 for s in b.ambiguity for n in s}
-    for effect in named:
+    answer = diagnosis.answer
+    open_ = {n for p in answer.parts for n in p.names if not p.sure or answer.missed}
+    for effect in (e for e in diagnosis.effects if e.term in answer.named):
         kind = EFFECTS[effect.id].block if effect.id in EFFECTS else ""
         doubt = "perhaps " if effect.term in open_ else ""
         for part in _at(parts, kind, effect.at):
@@ -318,7 +318,7 @@ class _Drawing:
     def _spoken(self) -> str:
         """The drawing in one sentence, for who cannot see it."""
         names = ", ".join(p.title for p in self.parts.values())
-        located = self.diagnosis.where.block
+        located = self.diagnosis.answer.block
         return f"The rig: {names}." + (f" The mismatch is in {located}." if located else "")
 
     def _lines(self, part: _Part) -> list[tuple[str, str]]:
@@ -380,17 +380,14 @@ class _Drawing:
         right = max(place[n][0] for n in inside) + BOX + pad
         low = max(place[n][1] + height[n] for n in inside) + pad + (20.0 if under else 0.0)
         title = low - 8.0 if under else y + 17.0
-        lit = name == self.diagnosis.where.block
-        verdict = next(
-            (b.verdict for b in self.diagnosis.judged if name in b.blocks), "effects" if lit else ""
-        )
-        part = None if mismatch is None else mismatch.held_out or mismatch.fitted
-        exceeds = part is not None and part.refit.more_than_noise
-        size = "" if mismatch is None else "fits to the noise"
+        lit = name == (self.diagnosis.answer.block or self.diagnosis.where.block)
+        left = left_in(self.diagnosis, name, "refit")
+        size = "fits to the noise" if left == "noise" else ""
         missed = mismatch and miss(self.diagnosis, mismatch.channel, "refit")
-        if exceeds and missed:
-            size = f"misses {format_number(missed.noises, 2)} × noise"
-        colour = COLOURS["before"] if lit or (exceeds and verdict != "none") else "#8a94a3"
+        if left in ("error", "more") and missed:
+            usual = "usual error: " if left == "error" else "misses "
+            size = f"{usual}{format_number(missed.noises, 2)} × noise"
+        colour = COLOURS["before"] if lit or left == "more" else "#8a94a3"
         text = textwrap.shorten(size, int((right - x) / 6.4), placeholder=" …")
         return dict(x=x, y=y, right=right, low=low, title=title, lit=lit, colour=colour, text=text)
 

@@ -19,14 +19,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pamrs._views import decimate
-from pamrs.findings import Curves, Findings, Trace
+from pamrs.findings import YOURS, Curves, Findings, Trace
 from pamrs.report.text import (
-    YOURS,
     display_unit,
     format_number,
     hypothesis_label,
     is_number,
-    model_name,
     spoken_name,
 )
 
@@ -210,7 +208,7 @@ def free_panels(diagnosis: Findings) -> list[Panel]:
         before, after = (format_number(v * factor, 2) for v in (error.before, error.after))
         return f": missed by {before}, {final.split()[0]} {after}"
 
-    final = model_name(diagnosis)
+    final = diagnosis.answer.model
     traces = sorted(diagnosis.free_traces, key=missed, reverse=True)
     if not traces:
         told = telling_trace(diagnosis)
@@ -236,7 +234,7 @@ def trace_panels(diagnosis: Findings, traces: Sequence[Trace]) -> list[Panel]:
     traces : sequence of Trace
         Channels of one recording, at least one.
     """
-    panels, final = [], model_name(diagnosis)
+    panels, final = [], diagnosis.answer.model
     for trace in traces:
         # the intervals are those of one recording
         marked = diagnosis.where.recording == trace.recording

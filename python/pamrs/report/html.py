@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -14,7 +13,15 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from pamrs._losses import Losses
-from pamrs.findings import HEALTHY, BlockMismatch, BlockVerdict, ChannelError, Findings, Trace
+from pamrs.findings import (
+    HEALTHY,
+    YOURS,
+    BlockMismatch,
+    BlockVerdict,
+    ChannelError,
+    Findings,
+    Trace,
+)
 from pamrs.report import figures, story
 from pamrs.report import text as words
 from pamrs.report.chain import chain_svg
@@ -25,21 +32,31 @@ TRACES = 3
 _LEAST_CONDITION = 0.005  # share of the excess below which a condition is not told: 0 %
 THROUGHOUT = 0.9
 """Share of a recording from which an excess is throughout it."""
-BADGES = {
+_BADGES = {
     "none": ("nothing missing", "nothing missing, but not settled"),
     "parameters": ("parameters inside their tolerances", "parameters or physics, not settled"),
     "effects": ("missing physics named", "missing physics, the name is not settled"),
     "unlisted": ("missing physics, not in the catalogue", "missing physics, no name"),
-    "units": ("a channel is in another unit",) * 2,
+    "units": ("", "a channel is in another unit"),
     "wrong": ("a value of the rig file is wrong", "a value of the rig file may be wrong"),
 }
-"""Verdicts in a few words, settled and where several answers are left; ``wrong`` is ``parameters``
-where a value is named."""
+"""Verdicts in a few words, settled and not settled; ``wrong`` is ``parameters`` where a value is
+named."""
+_MORE = ("not settled: what is missing was not found", "not settled: more is missing")
+"""The same where the final model still misses too much: without a name, and with one."""
 
 
-def _badge(verdict: str, *, wrong: bool, is_open: bool) -> str:
+def _badge(verdict: str, named: Sequence[str], *, settled: bool) -> str:
     """A verdict in a few words, no surer than it is."""
-    return BADGES["wrong" if wrong and verdict == "parameters" else verdict][is_open]
+    return _BADGES["wrong" if named and verdict == "parameters" else verdict][not settled]
+
+
+def case_badge(diagnosis: Findings) -> str:
+    """The answer in a few words."""
+    answer = diagnosis.answer
+    if answer.missed:
+        return _MORE[bool(answer.named)]
+    return _badge(answer.verdict, answer.named, settled=answer.settled)
 
 
 def _span(bounds: tuple[float, float] | None, digits: int = 3) -> str:
@@ -66,26 +83,25 @@ def _typeset(text: str) -> str:
     return raised.replace("+-", "±")
 
 
-def _verdict(block: BlockVerdict) -> tuple[str, str, str]:
-    """The verdict of a group of blocks, what it names, and the most probable hypothesis."""
-    wrong, is_open = bool(block.wrong_parameters), len(block.ambiguity) > 1
-    found = [*block.effects, *block.wrong_parameters]
-    leading, chance = max(
-        block.probabilities.items(), key=lambda kv: kv[1], default=("none", math.nan)
-    )
-    told = f"{words.hypothesis_label(leading)}, {words.format_probability(chance)}"
-    named = words.set_label(found) if found else "–"
-    return _badge(block.verdict, wrong=wrong, is_open=is_open), named, told
+def _verdict(diagnosis: Findings, block: BlockVerdict) -> tuple[str, str, str]:
+    """The verdict of a group of blocks, what it names, and what leads with its probability."""
+    part = diagnosis.answer.part_of(block.blocks[0])
+    if part is None:
+        return "", "", ""
+    lacking = {m.block for m in diagnosis.answer.missed} & {*block.blocks}
+    badge = _badge(block.verdict, part.names, settled=part.sure and not lacking)
+    told = f"{words.answer_label(part.words)}, {words.chance_told(part)}"
+    return badge, words.set_label(list(part.names)) if part.names else "–", told
 
 
 def _missed(diagnosis: Findings, block: BlockMismatch) -> list[str]:
     """What a block misses, refitted and with what was found."""
-    part = block.held_out or block.fitted
     told = []
     for stage in ("refit", "after"):
         missed = words.miss(diagnosis, block.channel, stage)
-        noise = "" if part[stage].more_than_noise else ", noise only"
-        told.append(f"{_typeset(str(missed))}{noise}" if missed else "–")
+        left = words.left_in(diagnosis, block.block, stage)
+        beside = {"noise": ", noise only", "error": ", inside its usual error"}.get(left, "")
+        told.append(f"{_typeset(str(missed))}{beside}" if missed else "–")
     return told
 
 
@@ -117,7 +133,7 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
     wrong = {w.name for w in diagnosis.wrong_parameters}
     rows = []
     for name, p in diagnosis.parameters.items():
-        known, size = p.identifiable is not False, abs(p.moved_sigmas)
+        known, size = p.known or name in wrong, abs(p.moved_sigmas)
         unit, factor = words.display_unit(p.unit, max(abs(p.nominal), abs(p.value)))
         told = known and math.isfinite(size)
         flag = "the rig file is wrong" if name in wrong else ""
@@ -145,17 +161,14 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
 
 
 def _fit(
-    errors: dict[str, ChannelError], final: str
+    errors: dict[str, ChannelError], stages: Mapping[str, str]
 ) -> list[tuple[str, str, list[tuple[str, str, str]]]]:
-    """Errors by channel: its name and unit, and of each stage its key, value and noise levels; the
-    final model where it is another one than those before.
-    """
+    """Errors by channel: its name and unit, and of each stage its key, value and noise levels."""
     rows = []
     for channel, unit, factor, entry in words.shown_errors(errors):
         noise, cells = entry.noise, []
-        for key, value in entry.items():
-            if key == "after" and final != words.MENDED:
-                continue
+        for key in stages:
+            value = entry[key]
             known = words.is_number(value) and words.is_number(noise) and noise > 0
             times = f"{words.format_number(value / noise, 2)}×" if known else "–"
             shown = words.format_number(value * factor) if words.is_number(value) else "–"
@@ -167,26 +180,33 @@ def _fit(
 def _fits(diagnosis: Findings) -> list[tuple[str, list[Any], str]]:
     """The tables of errors with their titles, and which errors the refit makes worse."""
     held, fitted = diagnosis.fit.held_out, diagnosis.fit.channels
-    worse = "" if diagnosis.verdict in HEALTHY else words.worse_sentence(held)
-    final = words.model_name(diagnosis)
+    worse = "" if diagnosis.answer.verdict in HEALTHY else words.worse_sentence(held)
+    stages = words.shown_stages(diagnosis)
     tables = (
-        ("Held-out recordings (not used for the fit)", _fit(held, final), worse),
-        ("Fitted recordings", _fit(fitted, final), ""),
+        ("Held-out recordings (not used for the fit)", _fit(held, stages), worse),
+        ("Fitted recordings", _fit(fitted, stages), ""),
     )
     return [own for own in tables if own[1]]
 
 
 def _free_run(diagnosis: Findings) -> list[tuple[str, str, str, list[str]]]:
     """Errors of free runs beside those of the cut chain, channel by channel."""
-    rows = []
+    rows, yours = [], diagnosis.answer.model == YOURS
     for run in diagnosis.free_run or []:
         for k, (channel, error) in enumerate(run.channels.items()):
-            every = (error.before, error.after, error.cut_before, error.cut_after)
+            every = (error.before, error.after, error.cut_before, error.cut_after)[:: 1 + yours]
             sizes = [abs(v) for v in every if words.is_number(v)]
             unit, factor = words.display_unit(error.unit, max(sizes, default=math.nan))
             cells = [words.format_number(v * factor) if words.is_number(v) else "–" for v in every]
             rows.append((run.recording if k == 0 else "", words.spoken_name(channel), unit, cells))
     return rows
+
+
+_LEFT = {
+    "noise": "left, no more than noise",
+    "error": "left, inside the usual error of the model",
+}
+"""What is left of a block's budget, where it is nothing unexplained."""
 
 
 def _budget(diagnosis: Findings) -> list[tuple[str, list[dict[str, str]]]]:
@@ -203,13 +223,13 @@ def _budget(diagnosis: Findings) -> list[tuple[str, list[dict[str, str]]]]:
     found = []
     for block, own in blocks.items():
         rows = []
+        left = _LEFT.get(words.left_in(diagnosis, block), "")
         for name, term in own:
-            rest = term.kind == "unexplained" and words.noise_alone(diagnosis, block)
             ends = sorted((at(0.0), at(term.share)))
             first, last = at(term.interval[0]), at(term.interval[1])
             rows.append(
                 {
-                    "name": "left, no more than noise" if rest else name,
+                    "name": left if term.kind == "unexplained" and left else name,
                     "kind": term.kind,
                     "text": words.format_share(term.share),
                     "interval": words.format_interval(term.interval),
@@ -226,16 +246,17 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for effect in diagnosis.effects:
         bench, vague = dict(story.bench_value(effect)), words.undetermined(effect)
+        closest = "" if effect.term in diagnosis.answer.named else "not named, but closest: "
         for name, own in effect.parameters.items():
             if name in vague:
                 continue
-            title = f"{words.label(effect.term)}: {words.label(name)}"
+            title = f"{closest}{words.label(effect.term)}: {words.label(name)}"
             told = _typeset(bench.get(words.label(name), ""))
             value = words.format_uncertain(own.value, own.std)
             rows.append((title, "", told, value, _span(words.span95(own)), _unit(own.unit)))
         if vague:
             names = ", ".join(map(words.label, vague))
-            title = f"{words.label(effect.term)}: not determined"
+            title = f"{closest}{words.label(effect.term)}: not determined"
             rows.append((title, f"these recordings do not determine {names}"))
     for entry in diagnosis.wrong_parameters:
         unit, factor = words.display_unit(entry.unit, abs(entry.nominal))
@@ -298,11 +319,6 @@ def _separating(diagnosis: Findings) -> Markup | None:
     return _curves(figures.separating_panels(own), "next") if own else None
 
 
-def _sentence(text: str) -> str:
-    """The first sentence of an instruction, no longer than a glance."""
-    return textwrap.shorten(re.split(r"(?<=[a-z)%])[.;] ", text)[0].rstrip("."), 180) + "."
-
-
 def render(diagnosis: Findings) -> str:
     """Return the report of a diagnosis as one HTML page without references to anything outside it.
 
@@ -336,24 +352,22 @@ def render(diagnosis: Findings) -> str:
         script=Path(__file__).with_name("curves.js").read_text(encoding="utf-8"),
         d=diagnosis,
         w=words,
-        badge=_badge(
-            diagnosis.verdict,
-            wrong=bool(diagnosis.wrong_parameters),
-            is_open=words.is_open(diagnosis),
-        ),
+        badge=case_badge(diagnosis),
         title=_typeset(story.title(diagnosis)),
         headline=_typeset(story.headline(diagnosis)),
         paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
         forms=list(dict.fromkeys(_typeset(u.form) for u in diagnosis.unexplained if u.form)),
         conditions=[c for c in diagnosis.where.conditions if c.share >= _LEAST_CONDITION],
-        mended=words.model_name(diagnosis) == words.MENDED,
+        stages=words.shown_stages(diagnosis),
+        final=diagnosis.answer.model,
+        yours=diagnosis.answer.model == YOURS,
         # said above already, where the text has it
         where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",
         recordings=recordings,
         hidden=hidden,
         free_head=figures.free_head(diagnosis),
-        record=_sentence(proposed.text) if proposed.excitation else "",
+        record=story.next_to_do(diagnosis).split(": ", 1) if story.next_to_do(diagnosis) else [],
         settings=settings.to_dict() if settings is not None else {},
         date=datetime.now().astimezone().isoformat(" ", "minutes"),
         data=". ".join(
@@ -361,7 +375,7 @@ def render(diagnosis: Findings) -> str:
         ),
         guarded=lambda what, caller: losses.part(f"the table of {what}", caller, ""),
         cells={"share": _share, "value": _value, "typeset": _typeset},
-        verdict=_verdict,
+        verdict=partial(_verdict, diagnosis),
         missed=partial(_missed, diagnosis),
         **pictures,
         **tables,

@@ -55,15 +55,16 @@ def one_page_pdf(diagnosis: Findings) -> bytes:
     with mpl.rc_context(STYLE | {"pdf.fonttype": 42}):
         figure = Figure(figsize=(8.27, 11.69))
         figure.set_layout_engine("constrained", w_pad=0.35, h_pad=0.12)
-        heights = [2.5, 1.4, 5.0, 2.4]
+        heights = [3.0, 1.4, 4.6, 2.3]
         parts = figure.subfigures(4, 1, height_ratios=heights, squeeze=False)[:, 0]
         top, chain, curves, bars = parts
         told = [f"{value} – {what}" for value, what in story.facts(diagnosis)]
-        lines = [textwrap.fill(text, 100) for text in [*told, *story.to_do(diagnosis)]]
+        told += [*story.to_do(diagnosis), story.next_to_do(diagnosis)]
+        lines = [textwrap.fill(text, 100) for text in filter(None, told)]
         title = textwrap.fill(story.title(diagnosis), 60)
         style: dict[str, Any] = {"ha": "left", "va": "top"}
-        top.text(0.05, 0.9, title, size=15, fontweight="bold", **style)
-        top.text(0.05, 0.58, "\n".join(lines), size=9, linespacing=1.5, **style)
+        top.text(0.05, 0.93, title, size=15, fontweight="bold", **style)
+        top.text(0.05, 0.64, "\n".join(lines), size=9, linespacing=1.5, **style)
         draw_chain(chain.add_axes((0.05, 0.0, 0.9, 1.0), frameon=False), diagnosis)
         _draw_first(curves, diagnosis, 3)
         _draw_rivals(bars, diagnosis)

@@ -4,15 +4,15 @@ on the bench, and why everything else lost.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis
-from pamrs.findings import HEALTHY, BlockVerdict, EffectFound, EffectParameterFound, Findings
+from pamrs.findings import HEALTHY, EffectFound, EffectParameterFound, Findings, Part
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
-LONGEST = 20
+LONGEST = 24
 """Words of a title at most."""
 MOST_RIVALS = 7
 """Explanations that are ranked on the first screen."""
@@ -34,40 +34,8 @@ class Rival(NamedTuple):
     why: str
 
 
-def _answer(block: BlockVerdict) -> list[Hypothesis]:
-    """The hypotheses of a group that are left, the most probable first."""
-    if len(block.ambiguity) > 1:
-        return [Hypothesis.of(names) for names in block.ambiguity]
-    return [
-        Hypothesis.of([*block.effects, *block.wrong_parameters] or [block.verdict or "unlisted"])
-    ]
-
-
-def _answering(diagnosis: Findings) -> list[BlockVerdict]:
-    """The groups of blocks in which something is or may be missing or wrong: those with a settled
-    name first, then the located one.
-    """
-    found = [
-        b
-        for b in words.told_blocks(diagnosis)
-        if len(b.ambiguity) > 1 or b.effects or b.wrong_parameters or b.verdict == "unlisted"
-    ]
-    if not found and diagnosis.verdict == "unlisted":
-        found = words.told_blocks(diagnosis)
-
-    def settled(block: BlockVerdict) -> bool:
-        answer = _answer(block)
-        return (
-            len(answer) == 1
-            and bool(answer[0].terms)
-            and (_chance(diagnosis, block, answer[0]) >= diagnosis.settled)
-        )
-
-    return sorted(found, key=lambda b: (not settled(b), diagnosis.where.block not in b.blocks))
-
-
 def title(diagnosis: Findings) -> str:
-    """One sentence of at most 20 words that states what all answers that are left share.
+    """One sentence of at most 24 words that states what all answers that are left share.
 
     Parameters
     ----------
@@ -80,26 +48,26 @@ def title(diagnosis: Findings) -> str:
         verb = "are" if len(names) > 1 else "is"
         told = f"{_listed(names, 2, 'and')} {verb} likely {first.likely}, not {first.said}"
         return f"{told[:1].upper()}{told[1:]}: no physics was judged"
-    groups = _answering(diagnosis)
-    if not groups:
+    parts = diagnosis.answer.parts
+    if diagnosis.answer.missed:
+        return words.missed_sentence(diagnosis, 1)
+    if not parts:
         return _healthy(diagnosis)
-    together = _together(diagnosis, groups)
+    together = _together(parts, doubt=False)
     if together and len(together.split()) <= LONGEST:
         return together
-    others = _listed([_place(diagnosis, b) for b in groups[1:]], 2, "and")
-    ends = (f"; something else in the {others}", "")
-    for end in ends if groups[1:] else ("",):
-        for most in (3, 2, 1):
-            told = _phrase(diagnosis, groups[0], most) + end
-            if len(told.split()) <= LONGEST:
-                return told
-    return _phrase(diagnosis, groups[0], 0)
+    others = _listed([_place(part) for part in parts[1:]], 2, "and")
+    acts = "in" if all(part.sure for part in parts[1:]) else "may act in"
+    end = f"; something else {acts} the {others}" if others else ""
+    every = (_phrase(diagnosis, parts[0], most) + end for most in (3, 2, 1))
+    short = (told for told in every if len(told.split()) <= LONGEST)
+    return next(short, _phrase(diagnosis, parts[0], 0) + end)
 
 
 def headline(diagnosis: Findings) -> str:
-    """The verdict in one sentence, however long: the title with all answers that are left, and
-    before and behind it sensors and commands that are faulty, what the whole rig misses from its
-    commands alone, and what was not judged.
+    """The verdict in a few sentences: sensors and commands that are faulty, what the final model
+    still misses, the title with all answers that are left, groups that only fit to within the error
+    of their model, and what was not judged.
 
     Parameters
     ----------
@@ -109,58 +77,43 @@ def headline(diagnosis: Findings) -> str:
     first = [entry.text for entry in diagnosis.faulty]
     if diagnosis.misread:
         return ". ".join([*first, "; ".join(reading.text for reading in diagnosis.misread)])
-    groups = _answering(diagnosis)
-    together = _together(diagnosis, groups)
-    phrases = ". ".join(_phrase(diagnosis, block, MOST_RIVALS) for block in groups)
-    told = [together or phrases or title(diagnosis)]
-    if groups and diagnosis.off:
-        told.append(words.off_sentence(diagnosis))
-    return ". ".join([*first, "; ".join([*told, *words.not_judged_words(diagnosis)])])
+    parts, missed = diagnosis.answer.parts, words.missed_sentence(diagnosis)
+    parts = [part for part in parts if not missed or words.searched(part)]
+    phrases = [_phrase(diagnosis, part, MOST_RIVALS) for part in parts]
+    together = _together(parts, doubt=bool(missed))
+    told = [*filter(None, [missed]), *([together] if together else phrases)] or [title(diagnosis)]
+    rest = [*words.within_error(diagnosis), *words.not_judged_words(diagnosis)]
+    return ". ".join([*first, *told[:-1], "; ".join([told[-1], *rest])])
 
 
-def _together(diagnosis: Findings, groups: Sequence[BlockVerdict]) -> str:
+def _together(parts: Sequence[Part], *, doubt: bool) -> str:
     """What several groups name, each with its place and how sure it is, where none leaves anything
     open: ``The model leaves out pressure lag in the arm (0.95) and in the chamber (0.93)``.
     """
-    if len(groups) < 2 or diagnosis.off or any(len(_answer(b)) > 1 for b in groups):
+    if len(parts) < 2 or any(p.group.wrong_parameters or not p.sure for p in parts):
         return ""
     places: dict[str, list[str]] = {}
-    for block in groups:
-        (answer,) = _answer(block)
-        name = words.set_label(answer.words) if answer.terms else "an effect outside the catalogue"
-        where = _with_chance(
-            f"in the {_place(diagnosis, block)}", _chance(diagnosis, block, answer)
-        )
-        places.setdefault(name, []).append(where)
+    for part in parts:
+        names = list(part.names)
+        name = words.set_label(names) if names else "an effect outside the catalogue"
+        places.setdefault(name, []).append(_with_chance(f"in the {_place(part)}", part))
     named = [f"{name} {_listed(own, len(own), 'and')}" for name, own in places.items()]
-    return f"The model leaves out {_listed(named, len(named), 'and')}"
+    verb = "may leave" if doubt else "leaves"
+    return f"The model {verb} out {_listed(named, len(named), 'and')}"
 
 
-def _chance(diagnosis: Findings, block: BlockVerdict, answer: Hypothesis) -> float:
-    """Probability of an answer about a group of blocks, as the headline has it."""
-    if len(block.ambiguity) < 2 and answer.terms:
-        return words.chance_of_named(diagnosis, block)
-    return words.chance_of(block.probabilities, answer.words)
-
-
-def _place(diagnosis: Findings, block: BlockVerdict) -> str:
+def _place(part: Part) -> str:
     """The block of a group with the mismatch, in words."""
-    return words.spoken_name(words.located_block(diagnosis, block) or "rig")
+    return words.spoken_name(part.block or "rig")
 
 
 def _healthy(diagnosis: Findings) -> str:
     """The title where no answer that is left has anything missing."""
-    if diagnosis.off:
-        channel, error = next(iter(diagnosis.off.items()))
-        size = words.sized(error.after, error.unit)
-        what = words.spoken_name(channel)
-        model = words.with_article(words.model_name(diagnosis))
-        return f"From its commands alone {model} of the whole rig misses {what} by {size}"
     place = words.judged_place(diagnosis) + words.beside_held(diagnosis)
-    if diagnosis.verdict == "parameters":
-        by = "values inside their tolerances explain the difference"
-        return f"No physics is missing{place}: {by}"
     how = words.down_to(diagnosis)
+    if diagnosis.answer.verdict == "parameters":
+        by = "values inside their tolerances explain the difference"
+        return f"No physics is missing{place}: {by}" + f" {how}" * (how != words.DOWN_TO_NOISE)
     return f"Nothing is missing{place}: the model explains these recordings {how}"
 
 
@@ -172,43 +125,46 @@ def _listed(names: Sequence[str], most: int, last: str) -> str:
     return words.listed(told, last)
 
 
-def _phrase(diagnosis: Findings, block: BlockVerdict, most: int) -> str:
+def _phrase(diagnosis: Findings, part: Part, most: int) -> str:
     """What the answers of a group that are left share, and at most so many of their names."""
-    left = _answer(block)
+    left = [Hypothesis.of(own) for own, _ in part.left]
+    doubt = bool(diagnosis.answer.missed) or not part.sure
     values = [term.is_value for h in left for term in h.terms]
     if len(left) == 1 and values and all(values):
-        wrong = [w for w in diagnosis.wrong_parameters if w.name in left[0].words]
+        wrong = [w for w in diagnosis.wrong_parameters if w.name in part.words]
         off = _listed(list(map(words.sentence_of, wrong)), max(most, 1), "and")
-        return f"The rig file is wrong: {off}"
-    chances = {h: _chance(diagnosis, block, h) for h in left if h not in (NONE, PARAMETERS)}
-    if left == [UNLISTED]:
-        if not chances[UNLISTED] < diagnosis.settled:
-            acts = f"Something acts in the {_place(diagnosis, block)}"
-            explains = "that no effect of the catalogue explains"
-            return _with_chance(f"{acts} {explains}", chances[UNLISTED])
-        ranked = words.ranked_probabilities(block.probabilities, None)
-        told_of = [(key, p) for key, p in ranked if key not in HEALTHY and p >= LEAST_TOLD]
-        chances = {Hypothesis.parse(key): p for key, p in told_of}
-    head = _head(diagnosis, block, left)
-    told = [_with_chance(words.set_label(h.words), p) for h, p in chances.items()]
-    return f"{head}: {_listed(told, most, 'or')}" if most and told else head
+        return f"The rig file {'may be' if doubt else 'is'} wrong: {off}"
+    if left == [UNLISTED] and part.sure:
+        acts = f"Something acts in the {_place(part)} that no effect of the catalogue explains"
+        return _with_chance(acts, part)
+    told = {h: p for h, (_, p) in zip(left, part.left, strict=True)}
+    if len(left) == 1:  # rivals of which none is probable enough for a set
+        ranked = words.ranked_probabilities(part.group.probabilities, None)
+        told |= {Hypothesis.parse(k): p for k, p in ranked if p >= LEAST_TOLD and not part.names}
+    named = [
+        _with_chance(words.set_label(h.words), part if h == left[0] else chance)
+        for h, chance in told.items()
+        if h not in (NONE, PARAMETERS)
+    ]
+    head = _head(_place(part), left, doubt=doubt)
+    return f"{head}: {_listed(named, most, 'or')}" if most and named else head
 
 
-def _with_chance(text: str, chance: float) -> str:
+def _with_chance(text: str, chance: Part | float) -> str:
     """Something with its probability behind it, where that is known."""
-    return f"{text} ({words.format_probability(chance)})" if words.is_number(chance) else text
+    known = chance.probability if isinstance(chance, Part) else chance
+    told = words.chance_told(chance) if isinstance(chance, Part) else ""
+    return f"{text} ({told or words.format_probability(known)})" if words.is_number(known) else text
 
 
-def _head(diagnosis: Findings, block: BlockVerdict, left: Sequence[Hypothesis]) -> str:
+def _head(place: str, left: Sequence[Hypothesis], *, doubt: bool) -> str:
     """What the answers of a group that are left share, in words."""
-    place = _place(diagnosis, block)
     if left[0] == NONE:
         return f"The model of the {place} may be complete; not ruled out"
     if left[0] == PARAMETERS:
         return f"Values may explain what the {place} misses; not ruled out"
-    # what the whole rig still misses says nothing against names that are open anyway
-    doubt = NONE in left or PARAMETERS in left or (bool(diagnosis.off) and len(left) == 1)
-    doubt = doubt and left != [UNLISTED]
+    # what is still missed says nothing against names that are open anyway
+    doubt = NONE in left or PARAMETERS in left or (doubt and len(left) == 1)
     values = [term.is_value for h in left for term in h.terms]
     if any(values):
         if all(values) and UNLISTED not in left:
@@ -218,13 +174,8 @@ def _head(diagnosis: Findings, block: BlockVerdict, left: Sequence[Hypothesis]) 
     shared = sorted(set.intersection(*kinds) - {""}) if kinds else []
     if shared and UNLISTED not in left:
         return f"The model of the {place} {'may leave' if doubt else 'leaves'} out {shared[0]}"
-    return f"Something {'may act' if doubt else 'acts'} in the {place} that the model leaves out"
-
-
-def _missing(block: BlockVerdict) -> float:
-    """Probability that something is missing or wrong in a group of blocks."""
-    healthy = (words.chance_of(block.probabilities, [key]) for key in ("none", "parameters"))
-    return min(1.0, max(0.0, 1.0 - sum(p for p in healthy if words.is_number(p))))
+    acts = "may act" if doubt and left[0] != UNLISTED else "acts"
+    return f"Something {acts} in the {place} that the model leaves out"
 
 
 def facts(diagnosis: Findings) -> list[tuple[str, str]]:
@@ -236,37 +187,41 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
             (f"{m.likely}, not {m.said}", ", ".join(map(words.spoken_name, m.channels)))
             for m in diagnosis.misread
         ]
-    found = []
-    groups = _answering(diagnosis)
-    if groups and groups[0].probabilities:
-        block = groups[0]
-        located = words.located_block(diagnosis, block) or "rig"
-        at = f" in {words.blocks_label(block)}" if len(block.blocks) > 1 else ""
-        what = f"something is missing{at}: probability {words.format_probability(_missing(block))}"
-        found.append((words.spoken_name(located), what))
-    for block in groups[:2]:
-        answer = _answer(block)[0]
-        at = f" in the {_place(diagnosis, block)}" if len(groups) > 1 else ""
-        chance = words.format_probability(_chance(diagnosis, block, answer))
-        found.append((words.hypothesis_label(str(answer)), f"probability {chance}{at}"))
-    if not groups:
-        answer_told, p = words.leading(diagnosis)
-        found.append((answer_told, f"probability {words.format_probability(p)}"))
-    named = diagnosis.effects if diagnosis.verdict == "effects" else []
-    for effect in sorted(named, key=lambda e: bool(groups) and e.term not in groups[0].effects):
+    answer, found = diagnosis.answer, list[tuple[str, str]]()
+    for own in answer.missed[:1]:
+        place = f"in the {words.spoken_name(own.block)}" if own.block else "in the whole rig"
+        what = f"{words.spoken_name(own.channel)} still missed {place}"
+        times = words.format_number(own.noises, 2)
+        found.append((words.sized(own.size, own.unit), f"{what} ({times} × noise)"))
+    parts = answer.parts[:2]
+    for part in parts[:1] if parts and parts[0].group.probabilities else ():
+        at = f" in {words.blocks_label(part.group)}" if len(part.group.blocks) > 1 else ""
+        chance = words.format_probability(_missing(part))
+        found.append((_place(part), f"something is missing or wrong{at}: probability {chance}"))
+    for part in parts or ([] if answer.missed else answer.quiet):
+        several = len(diagnosis.answer.parts or answer.quiet) > 1
+        at = words.blocks_label(part.group) if part in answer.quiet else _place(part)
+        label = words.answer_label(part.words)
+        what = f"probability {words.chance_told(part)}" + f" in the {at}" * several
+        found.append((label, what))
+    named = [e for e in diagnosis.effects if e.term in answer.named]
+    for effect in sorted(named, key=lambda e: bool(parts) and e.term not in parts[0].names):
         told = bench_value(effect)[:1]
         found += [(value, f"{words.label(effect.term)}: {name}") for name, value in told]
-    left = [m for b in diagnosis.judged for m in b.mismatch]
-    left = [m for m in left if (m.held_out or m.fitted).after.more_than_noise]
-    worst = max(left, key=lambda m: (m.held_out or m.fitted).after.noises, default=None)
-    channel = worst.channel if worst else diagnosis.where.channel
-    channel = channel or next(iter(diagnosis.fit.held_out or diagnosis.fit.channels), None)
-    last = words.miss(diagnosis, channel, "after")
+    channel = next((m.channel for p in parts for m in p.group.mismatch if m.block == p.block), None)
+    channel = channel or diagnosis.where.channel or words.worst_channel(diagnosis)
+    last = None if answer.missed else words.miss(diagnosis, channel, "after")
     if channel and last:
-        model = words.with_article(words.model_name(diagnosis))
+        model = words.with_article(answer.model)
         what = f"{words.spoken_name(channel)} missed by {model} ({last.size})"
         found.append((f"{words.format_number(last.noises, 2)} × noise", what))
     return found
+
+
+def _missing(part: Part) -> float:
+    """Probability that something is missing or wrong in a group of blocks."""
+    chances = part.group.probabilities
+    return min(1.0, max(0.0, 1.0 - sum(chances.get(key, 0.0) for key in HEALTHY)))
 
 
 def bench_value(effect: EffectFound, *, own_units: bool = False) -> list[tuple[str, str]]:
@@ -300,34 +255,49 @@ def _on_bench(effect: EffectFound, name: str, own: EffectParameterFound) -> str:
 
 
 def to_do(diagnosis: Findings) -> list[str]:
-    """What to do on the bench about each answer that is left, and what to record next."""
+    """What to do on the bench about each answer that is left."""
     found = []
-    for block in _answering(diagnosis)[:2]:
-        for term in dict.fromkeys(t for h in _answer(block) for t in h.terms):
+    for part in diagnosis.answer.parts[:2]:
+        for term in dict.fromkeys(t for own, _ in part.left for t in Hypothesis.of(own).terms):
             if term.is_value:
                 found.append(f"Measure {words.spoken_name(str(term))} again.")
             elif EFFECTS[term.id].bench:
                 found.append(EFFECTS[term.id].bench)
-    return list(dict.fromkeys(found))[:2]
+    return list(dict.fromkeys(found))[: 1 if next_to_do(diagnosis) else 2]
+
+
+def next_to_do(diagnosis: Findings) -> str:
+    """The next experiment, whole; without one what else would settle the answer, empty where it is
+    settled.
+    """
+    own = diagnosis.next_experiment
+    if own.instruction:
+        return f"Record next: {own.instruction}"
+    return f"Next: {own.text}" if own.text and not diagnosis.answer.settled else ""
 
 
 def rivals(diagnosis: Findings) -> list[Rival]:
     """The explanations of each mismatch in the order of the title, the most probable first, and why
     each stands there; behind those of the located one the effects that come closest by themselves.
     """
-    groups = _answering(diagnosis) or words.told_probabilities(diagnosis)
-    several = len(groups) > 1
+    shown = words.bars(diagnosis)
     found = []
-    for block in groups[:2]:
-        at = f" in the {_place(diagnosis, block)}" if several else ""
-        most = MOST_RIVALS // 2 if several else MOST_RIVALS
-        found += [row._replace(name=row.name + at) for row in _ranked(diagnosis, block, most)]
+    for part, chances in shown[:2]:
+        at = ""
+        if part and len(shown) > 1:
+            own = part in diagnosis.answer.quiet
+            at = f" in the {words.blocks_label(part.group) if own else _place(part)}"
+        most = MOST_RIVALS // 2 if len(shown) > 1 else MOST_RIVALS
+        rows = _ranked(diagnosis, part, chances, most)
+        found += [row._replace(name=row.name + at) for row in rows]
     return found
 
 
-def _ranked(diagnosis: Findings, block: BlockVerdict, most: int) -> list[Rival]:
+def _ranked(
+    diagnosis: Findings, part: Part | None, chances: Mapping[str, float], most: int
+) -> list[Rival]:
     """At most so many explanations of what one group of blocks misses."""
-    ranked = words.ranked_probabilities(block.probabilities, None)
+    ranked = words.ranked_probabilities(chances, None)
     shown = [(key, p) for key, p in ranked if p >= 0.005]
     shown += [(key, p) for key, p in ranked if p < 0.005 and key in ("none", "parameters")]
     known = {key for key, _ in ranked}
@@ -336,15 +306,15 @@ def _ranked(diagnosis: Findings, block: BlockVerdict, most: int) -> list[Rival]:
         key=lambda row: row.left or 0.0,
     )
     shown = shown[:most]
-    if diagnosis.where.block in block.blocks or not diagnosis.where.block:
+    if part in diagnosis.answer.parts[:1]:
         shown += [(row.id, 0.0) for row in closest[: max(0, most - len(shown))]]
     return [
         Rival(
             words.hypothesis_label(key),
             words.format_probability(p),
             max(0.0, min(1.0, p)),
-            words.is_named(block, key),
-            _why(diagnosis, block, key),
+            words.is_named(part, key),
+            _why(diagnosis, part, key),
         )
         for key, p in shown
     ]
@@ -369,27 +339,26 @@ def _taken(diagnosis: Findings, names: Iterable[str]) -> float | None:
     return next((float(v) for v in (*alone, *fitted) if words.is_number(v)), None)
 
 
-def _why(diagnosis: Findings, block: BlockVerdict, key: str) -> str:
+def _why(diagnosis: Findings, part: Part | None, key: str) -> str:
     """Why an explanation has the probability that it has."""
-    hypothesis, worst = Hypothesis.parse(key), words.worst_mismatch(block)
-    channel = diagnosis.where.channel
-    if worst and diagnosis.where.block not in block.blocks:
-        channel = worst.channel
-    about = words.spoken_name(channel) if channel else ""
-    stage = {NONE: "before", PARAMETERS: "refit"}.get(hypothesis, "")
-    missed = words.miss(diagnosis, channel, stage) if stage else None
-    if missed:
-        how = "as it is, the model" if stage == "before" else "refitted inside them, the model"
-        return f"{how} misses {about} by {missed}"
+    hypothesis = Hypothesis.parse(key)
     if hypothesis == UNLISTED:
         return "a cause without a name is never ruled out"
+    own = part.group.mismatch if part else ()
+    channel = next((m.channel for m in own if part and m.block == part.block), None)
+    channel = channel or diagnosis.where.channel
+    stage = {NONE: "before", PARAMETERS: "refit"}.get(hypothesis, "")
+    missed = words.miss(diagnosis, channel, stage) if stage else None
+    if missed and channel:
+        how = "as it is, the model" if stage == "before" else "refitted inside them, the model"
+        return f"{how} misses {words.spoken_name(channel)} by {missed}"
     taken = _taken(diagnosis, hypothesis.words)
-    if taken is None:
+    if taken is None or part is None:
         return ""
     told = f"takes {words.format_share(max(0.0, taken))} of what the refit leaves"
-    best = _taken(diagnosis, [*block.effects, *block.wrong_parameters])
-    if words.is_named(block, key) or best is None:
+    best = _taken(diagnosis, part.names)
+    if words.is_named(part, key) or best is None:
         return told
-    if set(hypothesis.words) > {*block.effects, *block.wrong_parameters}:
+    if set(hypothesis.words) > set(part.names):
         return f"{told}: no more than without the addition" if taken < best + AS_MUCH else told
     return f"{told} as well, with rarer values or names" if taken > best - AS_MUCH else told

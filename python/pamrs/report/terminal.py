@@ -7,7 +7,7 @@ import textwrap
 from functools import partial
 from typing import Final
 
-from pamrs.findings import Findings
+from pamrs.findings import YOURS, Findings
 from pamrs.report import story
 from pamrs.report import text as words
 from pamrs.units import with_unit
@@ -53,10 +53,11 @@ def summary(diagnosis: Findings) -> str:
         lines += _wrapped(f"Unexplained: {words.kept_sentence(kept)}")
     for asked in diagnosis.considered:
         lines += _wrapped(f"Asked for: {words.considered_sentence(asked)}")
-    if len(diagnosis.ambiguity) > 1:
-        sets = "; ".join(words.set_label(s) for s in diagnosis.ambiguity)
-        lines += ["", *_wrapped(f"Not separable: {sets}.")]
-    for instruction in story.to_do(diagnosis)[: 1 if diagnosis.next_experiment.text else 2]:
+    for part in diagnosis.answer.parts:
+        if len(part.left) > 1:
+            sets = "; ".join(words.answer_label(own) for own, _ in part.left)
+            lines += ["", *_wrapped(f"Not separable: {sets}.")]
+    for instruction in story.to_do(diagnosis):
         lines += _wrapped(f"On the bench: {instruction}")
     lines += _next(diagnosis)
     lines += _data(diagnosis)
@@ -71,12 +72,12 @@ def summary(diagnosis: Findings) -> str:
 def _probabilities(diagnosis: Findings) -> list[str]:
     """Bars of each group of blocks with a mismatch."""
     lines = []
-    for block in words.told_probabilities(diagnosis):
-        rows = words.ranked_probabilities(block.probabilities, 5)
+    for part, chances in words.bars(diagnosis):
+        rows = words.ranked_probabilities(chances, 5)
         if rows:
             lines.append("")
-        if rows and len(diagnosis.judged) > 1 and block.blocks:
-            lines.append(f"{words.blocks_label(block)}:")
+        if rows and len(diagnosis.judged) > 1 and part:
+            lines.append(f"{words.blocks_label(part.group)}:")
         names = [words.hypothesis_label(name) for name, _ in rows]
         width = min(max(38, *map(len, names)), 56) if names else 38
         lines += [
@@ -100,7 +101,8 @@ def _free_run(diagnosis: Findings) -> list[str]:
             before, after = (
                 words.format_number(v * factor, unicode=False) for v in (error.before, error.after)
             )
-            told.append(f"{channel} {before} to {after} {unit}")
+            to = f" to {after}" if diagnosis.answer.model != YOURS else ""
+            told.append(f"{channel} {before}{to} {unit}")
         text = f"Whole rig from its commands alone, {run.recording}: {'; '.join(told)}"
         lines += _wrapped(text.translate(_ASCII))
     return lines
@@ -146,11 +148,12 @@ def _fit(diagnosis: Findings) -> list[str]:
     if not channels:
         return []
     title = "held-out error" if diagnosis.fit.held_out else "error (fit)"
-    stages = ("noise", "your model", "refitted", words.model_name(diagnosis).split()[0])
-    lines = ["", f"{title:<22}{''.join(f'{stage:>11}' for stage in stages)}"]
+    stages = words.shown_stages(diagnosis)
+    lines = ["", f"{title:<22}{''.join(f'{name:>11}' for name in stages.values())}"]
     for channel, unit, factor, entry in words.shown_errors(channels):
         name = with_unit(channel, f"[{unit.replace('°', 'deg')}]" if unit else "")
-        shown = [float(v) * factor if words.is_number(v) else None for v in entry.values()]
+        sizes = (entry[stage] for stage in stages)
+        shown = [v * factor if words.is_number(v) else None for v in sizes]
         cells = (f"{words.format_number(v, unicode=False):>11}" for v in shown)
         lines.append(f"{name:<22}{''.join(cells)}")
     return lines
@@ -163,9 +166,7 @@ def notebook(diagnosis: Findings) -> str:
         f"<td>{html.escape(words.format_probability(p))}</td>"
         f"<td style='text-align:left'><span style='display:inline-block;height:.7em;"
         f"width:{max(0.0, min(1.0, p)) * 12:.2f}em;background:#0072b2'></span></td></tr>"
-        for name, p in words.ranked_probabilities(
-            words.told_probabilities(diagnosis)[0].probabilities, 5
-        )
+        for name, p in words.ranked_probabilities(words.bars(diagnosis)[0][1], 5)
     )
     mended = words.mended_sentence(diagnosis, "With what was found")
     closed = f"<p>{html.escape(mended)}, on {diagnosis.proof}.</p>" if mended else ""

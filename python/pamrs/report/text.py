@@ -13,7 +13,10 @@ from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS, Hypothesis, Term, effect_of
 from pamrs.findings import (
     HEALTHY,
-    BlockMismatch,
+    MENDED,
+    MOST_MISSED,
+    NOISE_LEVELS,
+    YOURS,
     BlockVerdict,
     BudgetTerm,
     ChannelError,
@@ -22,8 +25,10 @@ from pamrs.findings import (
     EffectParameterFound,
     Findings,
     PairExperiment,
+    Part,
     Unexplained,
     WrongParameter,
+    left_of,
 )
 from pamrs.rig.schema import BLOCKS
 from pamrs.units import with_unit
@@ -35,9 +40,6 @@ _LABELS = {
     "dahl": "Dahl",
     **{effect.id: effect.label for effect in EFFECTS.values() if effect.label},
 }
-
-MENDED, YOURS = "mended model", "your model"
-"""What the model with what was found is called, and that of the rig file."""
 
 TELLING = 0.25
 """How far below nothing or above everything a share is still told by itself."""
@@ -94,6 +96,11 @@ def hypothesis_label(key: str) -> str:
     return set_label(Hypothesis.parse(key).words)
 
 
+def answer_label(names: Sequence[str]) -> str:
+    """Readable name of what leads a group: none and parameters are one answer."""
+    return "no physics is missing" if names[:1] and names[0] in HEALTHY else set_label([*names])
+
+
 def listed(names: Sequence[str], last: str = "and") -> str:
     """Names in a row: ``a, b and c``."""
     return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
@@ -135,6 +142,14 @@ def shown_errors(
     for channel, entry in errors.items():
         sizes = [abs(v) for v in entry.values() if is_number(v)]
         yield channel, *display_unit(unit_of(channel), max(sizes, default=math.nan)), entry
+
+
+def shown_stages(diagnosis: Findings) -> dict[str, str]:
+    """The columns of a table of errors by their keys: the final model has one of its own where it
+    is another one than those before.
+    """
+    first = {"noise": "noise", "before": YOURS, "refit": "refitted"}
+    return first | ({"after": "mended"} if diagnosis.answer.model == MENDED else {})
 
 
 def _power(exponent: int, unicode: bool) -> str:
@@ -216,19 +231,14 @@ def ranked_probabilities(
     return [*known[: count - 1], (f"all others ({len(rest)})", sum(p for _, p in rest))]
 
 
-def told_probabilities(diagnosis: Findings) -> list[BlockVerdict]:
-    """The groups of blocks whose probabilities a reader needs, that of the headline first: those
-    with a mismatch; one for the whole case where none has, or where a result does not tell them
-    apart.
+def bars(diagnosis: Findings) -> list[tuple[Part | None, Mapping[str, float]]]:
+    """The groups of blocks whose probabilities a reader needs, that of the headline first, and
+    these: those of the whole case, without a group, where no group shows what is missing.
     """
-    blocks = told_blocks(diagnosis)
-    found = [b for b in blocks if b.verdict not in HEALTHY or b.wrong_parameters or b.ambiguity]
-    if not diagnosis.judged or not found:
-        names = [w.name for w in diagnosis.wrong_parameters]
-        effects = [e.term for e in diagnosis.effects if diagnosis.verdict == "effects"]
-        whole = BlockVerdict([], diagnosis.verdict, diagnosis.probabilities, effects, names, [])
-        return [whole]
-    return sorted(found, key=lambda b: diagnosis.where.block not in b.blocks)
+    answer = diagnosis.answer
+    if answer.parts or (answer.quiet and not answer.missed):
+        return [(p, p.group.probabilities) for p in answer.parts or answer.quiet]
+    return [(None, diagnosis.probabilities)]
 
 
 def blocks_label(block: BlockVerdict) -> str:
@@ -236,10 +246,9 @@ def blocks_label(block: BlockVerdict) -> str:
     return " and ".join(spoken_name(name) for name in block.blocks)
 
 
-def is_named(block: BlockVerdict, hypothesis: str) -> bool:
-    """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that a group names."""
-    named = [*block.effects, *block.wrong_parameters] or [block.verdict]
-    return Hypothesis.parse(hypothesis) == Hypothesis.of(named)
+def is_named(part: Part | None, hypothesis: str) -> bool:
+    """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that leads a group."""
+    return part is not None and set(hypothesis.split("+")) == set(part.words)
 
 
 def sentence_of(wrong: WrongParameter) -> str:
@@ -277,11 +286,11 @@ def considered_sentence(own: Considered) -> str:
 
 def kept_sentence(kept: Unexplained) -> str:
     """What is left in a block: ``the residual of the arm is 15 times the noise level (0.4 deg) on
-    held-out recordings, and no listed effect explains it``.
+    held-out recordings, and nothing that was tried explains it``.
     """
     why = "what is named does not explain it"
     if kept.verdict == "unlisted":
-        why = "no listed effect explains it"
+        why = "nothing that was tried explains it"
     times = format_number(kept.noises, 2, unicode=False)
     on = {"held_out": " on held-out recordings", "fit": " on the fitted recordings"}
     return (
@@ -376,31 +385,40 @@ def _shared(one: str, other: str) -> int:
     return max(ends, default=0)
 
 
-def off_sentence(diagnosis: Findings) -> str:
-    """What the whole rig misses from its commands alone, in words; empty where it misses no more
-    than noise and the uncertainty of its values explain.
+def searched(part: Part) -> bool:
+    """Whether anything with a name was tried for what a group of blocks misses."""
+    return any(key not in (*HEALTHY, "unlisted") for key in part.group.probabilities)
+
+
+def missed_sentence(diagnosis: Findings, most: int | None = None) -> str:
+    """What the final model still misses, in words; empty where that is no more than noise and its
+    error explain.
+
+    Parameters
+    ----------
+    diagnosis : Findings
+        What was found.
+    most : int, optional
+        Channels that are told at most, then without their noise levels.
     """
-    told, model = [], model_name(diagnosis)
-    for channel, error in diagnosis.off.items():
-        size, times = sized(error.after, error.unit), format_number(error.noises, 2, unicode=False)
-        differs = model != YOURS and is_number(error.before)
-        own = f"; {YOURS}: {sized(error.before, error.unit)}" if differs else ""
-        told.append(f"{spoken_name(channel)} by {size} ({times} times the noise level{own})")
+    answer, told = diagnosis.answer, dict[str, str]()
+    for own in answer.missed:
+        times = f"{format_number(own.noises, 2, unicode=False)} noise levels"
+        if answer.model != YOURS and own.block is None and is_number(own.before):
+            times += f"; {YOURS}: {sized(own.before, own.unit)}"
+        place = f"in the {spoken_name(own.block)}" if own.block else "in the whole rig"
+        size = sized(own.size, own.unit) + (f" ({times})" if most is None else "")
+        told.setdefault(own.channel, f"{spoken_name(own.channel)} by {size} {place}")
     if not told:
         return ""
-    said = " and ".join(told)
-    return f"from its commands alone {with_article(model)} of the whole rig misses {said}"
+    what = "what else is missing" if answer.named else "what is missing"
+    said = listed(list(told.values())[:most])
+    return capital(f"{with_article(answer.model)} still misses {said}; {what} was not found")
 
 
-def model_name(diagnosis: Findings) -> str:
-    """What the final model is called: ``mended model`` where anything was found, an effect, a value
-    or a form without a name; ``your model`` where nothing is missing; else ``refitted model``.
-    """
-    if diagnosis.verdict == "none":
-        return YOURS
-    found = diagnosis.wrong_parameters or any(kept.form for kept in diagnosis.unexplained)
-    named = diagnosis.verdict == "effects" and diagnosis.effects
-    return MENDED if found or named else "refitted model"
+def capital(text: str) -> str:
+    """A text that begins a sentence."""
+    return text[:1].upper() + text[1:]
 
 
 def with_article(model: str) -> str:
@@ -417,7 +435,7 @@ def worse_sentence(errors: Mapping[str, ChannelError]) -> str:
         for channel, error in errors.items()
         if is_number(error.before)
         and is_number(error.refit)
-        and error.refit > _CLEARLY_WORSE * max(error.before, _MORE_THAN_NOISE * error.noise)
+        and error.refit > _CLEARLY_WORSE * max(error.before, NOISE_LEVELS * error.noise)
     ]
     if not worse:
         return ""
@@ -425,6 +443,24 @@ def worse_sentence(errors: Mapping[str, ChannelError]) -> str:
         f"Values fitted to the other recordings make the {' and the '.join(worse)} worse here: "
         "values inside their tolerances do not explain the difference"
     )
+
+
+def within_error(diagnosis: Findings) -> list[str]:
+    """Groups of which nothing is missing, beside others, that miss much, inside the error of their
+    model: ``the arm fits to within its usual error (joint angle 1.2 deg of 1.9 deg)``.
+    """
+    told = []
+    for part in diagnosis.answer.quiet if diagnosis.answer.parts else ():
+        for own in part.group.mismatch:
+            found = miss(diagnosis, own.channel, "after")
+            if found and found.noises > MOST_MISSED and left_in(diagnosis, own.block) == "error":
+                usual = (
+                    f"{spoken_name(own.channel)} {found.size} of {sized(own.model_error, own.unit)}"
+                )
+                told.append(
+                    f"the {spoken_name(own.block)} fits to within its usual error ({usual})"
+                )
+    return told
 
 
 def not_judged_words(diagnosis: Findings) -> list[str]:
@@ -439,125 +475,28 @@ def not_judged_words(diagnosis: Findings) -> list[str]:
     return [f"not judged: {'; '.join(told)}"] if told else []
 
 
-def told_blocks(diagnosis: Findings) -> list[BlockVerdict]:
-    """The groups of blocks with their names; one of the whole case where a result does not tell
-    them apart.
+def chance_told(part: Part) -> str:
+    """Probability of what leads a group: ``0.93``, or ``0.60, alone or with others`` of names that
+    its sets have in common.
     """
-    if diagnosis.blocks:
-        return diagnosis.judged
-    block = diagnosis.where.block
-    return [
-        BlockVerdict(
-            blocks=[block] if block else [],
-            verdict="",  # that of the case, which is told apart
-            probabilities=diagnosis.probabilities,
-            effects=[e.term for e in diagnosis.effects] if diagnosis.verdict == "effects" else [],
-            wrong_parameters=[w.name for w in diagnosis.wrong_parameters],
-            ambiguity=diagnosis.ambiguity,
-        )
-    ]
+    return format_probability(part.probability) + ", alone or with others" * part.together
 
 
-def worst_mismatch(block: BlockVerdict) -> BlockMismatch | None:
-    """The largest mismatch of a group of blocks."""
-    return max(block.mismatch, key=lambda m: m.fitted.refit.noises, default=None)
-
-
-def located_block(diagnosis: Findings, block: BlockVerdict) -> str | None:
-    """The block of a group that has the mismatch: the located one, or of another group the one that
-    misses most.
-    """
-    if diagnosis.where.block in block.blocks:
-        return diagnosis.where.block
-    worst = worst_mismatch(block)
-    return worst.block if worst else next(iter(block.blocks), None)
-
-
-def _place(diagnosis: Findings, block: BlockVerdict) -> str:
-    """Where a group has its mismatch, as the end of a sentence."""
-    located = located_block(diagnosis, block)
-    return f" in the {spoken_name(located)}" if located else ""
-
-
-def chance_of(probabilities: Mapping[str, float], names: Sequence[str]) -> float:
-    """Probability of a hypothesis by its names, in whatever order its key has them; NaN where it is
-    not among them.
-    """
-    wanted = Hypothesis.of(names)
-    found = (float(p) for key, p in probabilities.items() if Hypothesis.parse(key) == wanted)
-    return next((p for p in found if is_number(p)), math.nan)
-
-
-def chance_of_named(diagnosis: Findings, block: BlockVerdict) -> float:
-    """Probability of what a block names: of that set of names where it leads, else of the least
-    probable of the names, whatever else acts beside it.
-    """
-    names = [*block.effects, *block.wrong_parameters]
-    known = [float(p) for p in block.probabilities.values() if is_number(p)]
-    together = chance_of(block.probabilities, names)
-    if is_number(together) and together >= max(known):
-        return together
-    every: list[EffectFound | WrongParameter] = [
-        *(e for e in diagnosis.effects if e.term in names),
-        *(w for w in diagnosis.wrong_parameters if w.name in names),
-    ]
-    return min((e.probability for e in every if is_number(e.probability)), default=math.nan)
-
-
-def open_chances(diagnosis: Findings) -> Mapping[str, float]:
-    """Probabilities of the sets that are left: those of the one group of blocks that is open, as
-    the headline has them, else those of the case.
-    """
-    is_open = [b for b in diagnosis.judged if len(b.ambiguity) > 1]
-    return is_open[0].probabilities if len(is_open) == 1 else diagnosis.probabilities
-
-
-def name_chance(diagnosis: Findings, entry: EffectFound | WrongParameter) -> str:
+def name_chance(diagnosis: Findings, name: str) -> str:
     """Probability of one name, and that it counts sets with others where these make a
     difference: ``0.93, alone or with others``; where several groups of blocks name it, that of
     each: ``0.94 in the chamber, 0.92 in the arm``.
     """
-    name = entry.term if isinstance(entry, EffectFound) else entry.name
-    text = format_probability(entry.probability)
-    naming = [b for b in told_blocks(diagnosis) if name in (*b.effects, *b.wrong_parameters)]
-    if len(naming) > 1 and all(len((*b.effects, *b.wrong_parameters)) == 1 for b in naming):
+    naming = [part for part in diagnosis.answer.parts if name in part.names]
+    if len(naming) > 1:
         return ", ".join(
-            f"{format_probability(chance_of_named(diagnosis, b))}{_place(diagnosis, b)}"
-            for b in naming
+            f"{format_probability(p.with_name(name))} in the {spoken_name(p.block or 'rig')}"
+            for p in naming
         )
-    for block in told_blocks(diagnosis):
-        named = [*block.effects, *block.wrong_parameters]
-        if name in named and format_probability(chance_of_named(diagnosis, block)) != text:
-            return f"{text}, alone or with others"
-    return text
-
-
-def leading(diagnosis: Findings) -> tuple[str, float]:
-    """What a diagnosis answers for the whole case, in words, and its probability; NaN where it is
-    not known.
-    """
-    probabilities = diagnosis.probabilities
-    wrong = [w.name for w in diagnosis.wrong_parameters]
-    names = wrong + [e.term for e in diagnosis.effects if diagnosis.verdict == "effects"]
-    if not names and diagnosis.verdict == "unlisted":
-        return label("unlisted"), chance_of(probabilities, ["unlisted"])
-    if not names:
-        found = [chance_of(probabilities, [key]) for key in HEALTHY]
-        known = [p for p in found if is_number(p)]
-        answer = f"no physics is missing{judged_place(diagnosis)}"
-        return answer, sum(known) if known else math.nan
-    own = [b for b in told_blocks(diagnosis) if b.effects or b.wrong_parameters]
-    if len(own) == 1:
-        return set_label(names), chance_of_named(diagnosis, own[0])
-    whole = BlockVerdict(
-        blocks=[],
-        verdict="",
-        probabilities=probabilities,
-        effects=[n for n in names if n not in wrong],
-        wrong_parameters=wrong,
-        ambiguity=[],
-    )
-    return set_label(names), chance_of_named(diagnosis, whole)
+    for part in naming:
+        text = format_probability(part.with_name(name))
+        return text if text == chance_told(part) else f"{text}, alone or with others"
+    return ""
 
 
 class Miss(NamedTuple):
@@ -597,8 +536,14 @@ def miss(diagnosis: Findings, channel: str | None, stage: str) -> Miss | None:
         On held-out recordings, on the fitted ones where there are none; None where a result does
         not say.
     """
-    errors = diagnosis.fit.held_out or diagnosis.fit.channels
+    errors = diagnosis.proven
     return None if channel not in errors else miss_of(errors[channel], channel, stage)
+
+
+def worst_channel(diagnosis: Findings) -> str | None:
+    """The channel that the final model misses most, in noise levels."""
+    found = {c: m.noises for c in diagnosis.proven if (m := miss(diagnosis, c, "after"))}
+    return max(found, key=lambda channel: found[channel], default=None)
 
 
 def miss_of(error: ChannelError, channel: str, stage: str) -> Miss | None:
@@ -617,7 +562,8 @@ def sized(value: float, unit: str) -> str:
 
 
 def mended_sentence(diagnosis: Findings, by: str) -> str:
-    """What the channels of the blocks with a name are missed by, before and after.
+    """What the channels of the blocks with a name, or with a form of what has none, are missed by,
+    before and after.
 
     Parameters
     ----------
@@ -630,9 +576,10 @@ def mended_sentence(diagnosis: Findings, by: str) -> str:
     str
         Empty where the errors are not known, and where nothing is mended.
     """
-    named = [b for b in diagnosis.judged if b.effects or b.wrong_parameters]
-    own = [m.channel for b in named for m in b.mismatch if m.block == diagnosis.where.block]
-    told = []
+    answer, told = diagnosis.answer, list[str]()
+    mended = {m.block: m.channel for b in diagnosis.judged for m in b.mismatch}
+    blocks = [p.block for p in answer.parts if p.names or answer.model == MENDED]
+    own = [mended[block] for block in blocks if block in mended]
     for channel in own or [diagnosis.where.channel or ""]:
         before, after = (miss(diagnosis, channel, stage) for stage in ("refit", "after"))
         if before and after and after.noises < before.noises:
@@ -640,22 +587,32 @@ def mended_sentence(diagnosis: Findings, by: str) -> str:
     return f"{by} the model misses {' and '.join(told)}" if told else ""
 
 
-def is_open(diagnosis: Findings) -> bool:
-    """Whether the answer is not settled: several sets are left, the whole rig misses a channel
-    whatever the blocks say, or no name is given and an effect outside the catalogue is not probable
-    enough to be said.
-    """
-    if len(diagnosis.ambiguity) > 1 or diagnosis.off:
-        return True
-    return diagnosis.verdict == "unlisted" and leading(diagnosis)[1] < diagnosis.settled
+def unsettled_sentence(diagnosis: Findings) -> str:
+    """Why an answer is not settled; empty where it is."""
+    answer = diagnosis.answer
+    open_ = [part for part in answer.parts if len(part.left) > 1]
+    several = len(answer.parts) > 1
+    told = []
+    if answer.missed:
+        told.append(f"{with_article(answer.model)} misses more than noise and its error explain")
+    for part in open_:
+        place = f" in the {spoken_name(part.block or 'rig')}" if several else ""
+        told.append(f"these recordings cannot tell {told_apart(part)}{place}")
+    for part in answer.parts:
+        if part not in open_ and not part.sure:
+            what = set_label(list(part.words))
+            told.append(
+                f"{what} has {chance_told(part)}, and more than {diagnosis.settled} is needed"
+            )
+    return f"It is not settled: {'; '.join(told)}." if told else ""
 
 
-def told_apart(sets: list[list[str]], probabilities: Mapping[str, float]) -> str:
-    """Hypotheses that are left, the most probable first: ``a (0.80) from b (0.12)``, ``a (0.50), b
-    (0.30) and c (0.20) apart``.
+def told_apart(part: Part) -> str:
+    """Hypotheses that are left of a group, the one that leads first: ``a (0.80) from b (0.12)``,
+    ``a (0.50), b (0.30) and c (0.20) apart``.
     """
-    names = {name for s in sets for name in s}
-    told = [_answer([_spread(n, names) for n in s], chance_of(probabilities, s)) for s in sets]
+    names = {name for words, _ in part.left for name in words}
+    told = [_answer([_spread(n, names) for n in own], chance) for own, chance in part.left]
     if len(told) == 2:
         return f"{told[0]} from {told[1]}"
     return f"{', '.join(told[:-1])} and {told[-1]} apart"
@@ -670,39 +627,48 @@ def _spread(name: str, others: Collection[str]) -> str:
 
 def _answer(names: list[str], chance: float = math.nan) -> str:
     """One of several hypotheses, in words, with its probability."""
-    fixed = {
-        "parameters": "parameter values that are off",
-        "unlisted": "an effect outside the catalogue",
-        "none": "nothing missing",
-    }
-    text = (
-        fixed[names[0]]
-        if len(names) == 1 and names[0] in fixed
-        else " + ".join(
+    if len(names) == 1 and names[0] in (*HEALTHY, "unlisted"):
+        text = f"an {label(names[0])}" if names[0] == "unlisted" else "no missing physics"
+    else:
+        text = " + ".join(
             f"a {set_label([name])}" if Term.parse(name).is_value else label(name) for name in names
         )
-    )
     return f"{text} ({format_probability(chance)})" if is_number(chance) else text
+
+
+DOWN_TO_NOISE = "down to the noise level"
+"""How closely a model explains recordings of which only noise is left."""
 
 
 def down_to(diagnosis: Findings) -> str:
     """How closely a model without anything missing explains the recordings: ``down to the noise
     level``, or to within the error that is taken for its own where it misses more than noise.
     """
-    errors = diagnosis.fit.held_out or diagnosis.fit.channels
     missed = [
-        (found.noises, found.size, own)
-        for block in diagnosis.judged
-        for own in block.mismatch
-        if (found := miss(diagnosis, own.channel, "after"))
-        and found.noises > _MORE_THAN_NOISE
-        and own.model_error > errors[own.channel].noise
+        (found.noises, own, left, found)
+        for part in diagnosis.answer.quiet
+        for own in part.group.mismatch
+        if (left := left_in(diagnosis, own.block)) not in ("", "noise")
+        and (found := miss(diagnosis, own.channel, "after"))
     ]
     if not missed:
-        return "down to the noise level"
-    _, size, own = max(missed, key=lambda each: each[0])
+        return DOWN_TO_NOISE
+    _, own, left, found = max(missed, key=lambda each: each[0])
+    if left == "more":
+        return f"to within {found} of {spoken_name(own.channel)}"
     usual = sized(own.model_error, own.unit)
-    return f"to within its usual error ({spoken_name(own.channel)} {size} of {usual})"
+    return f"to within its usual error ({spoken_name(own.channel)} {found.size} of {usual})"
+
+
+def left_in(diagnosis: Findings, block: str, stage: str = "after") -> str:
+    """What is left in a block with the final model, as :func:`pamrs.findings.left_of` has it; empty
+    where a result does not say.
+    """
+    own = next((m for b in diagnosis.judged for m in b.mismatch if m.block == block), None)
+    if own is None:
+        return ""
+    healthy = diagnosis.answer.part_of(block) in diagnosis.answer.quiet
+    return left_of(own, diagnosis.proven.get(own.channel), stage, healthy=healthy)
 
 
 def judged_place(diagnosis: Findings) -> str:
@@ -757,27 +723,29 @@ def effect_title(effect: EffectFound) -> str:
 def effect_heading(diagnosis: Findings, effect: EffectFound) -> str:
     """The same, and that it only comes closest where it is not named."""
     title = effect_title(effect)
-    return title if diagnosis.verdict == "effects" else f"not named, but closest: {title}"
+    named = effect.term in diagnosis.answer.named
+    return title if named else f"not named, but closest: {title}"
 
 
-def noise_alone(diagnosis: Findings, block: str) -> bool:
-    """Whether noise could be as large as what a block keeps with the final model, on the recordings
-    of its budget; False where a result does not say.
-    """
-    own = [m for b in diagnosis.judged for m in b.mismatch if m.block == block]
-    return bool(own) and not (own[0].held_out or own[0].fitted).after.more_than_noise
+_LEFT = {
+    "noise": "only noise is left",
+    "error": "what is left is inside the usual error of the model",
+}
+"""What is said of what a block keeps, where it is nothing unexplained."""
 
 
 def budget_sentences(diagnosis: Findings) -> list[tuple[str, str]]:
     """Each block with a budget and that in words."""
     return [
-        (block, budget_sentence(own, noise_only=noise_alone(diagnosis, block)))
+        (block, budget_sentence(own, left_in(diagnosis, block)))
         for block, own in budgets(diagnosis).items()
     ]
 
 
-def budget_sentence(terms: Sequence[BudgetTerm], *, noise_only: bool = False) -> str:
-    """The budget of one block in words; what is left is told as noise where it is no more."""
+def budget_sentence(terms: Sequence[BudgetTerm], left: str = "") -> str:
+    """The budget of one block in words; what is left is told as what it is, where that is known
+    (``noise``, ``error``, ``more``).
+    """
     *before, (_, last) = told_terms(terms)
     told = [
         f"{name} {format_share(term.share)} ({format_interval(term.interval)})"
@@ -787,8 +755,8 @@ def budget_sentence(terms: Sequence[BudgetTerm], *, noise_only: bool = False) ->
     share = f"{format_share(last.share)} unexplained"
     if not _tellable(last.share):
         share = "more is unexplained than with the nominal model"
-    left = share if last.noises > 0.0 and not noise_only else "only noise is left"
-    return "; ".join([*told, left]) + "."
+    left = left or ("more" if last.noises > 0.0 else "noise")
+    return "; ".join([*told, _LEFT.get(left, share)]) + "."
 
 
 def told_terms(terms: Sequence[BudgetTerm]) -> list[tuple[str, BudgetTerm]]:
@@ -835,8 +803,6 @@ def format_interval(interval: Sequence[float]) -> str:
 
 
 _CLEARLY_WORSE = 1.1  # ratio of two errors that is no accident of the noise
-_MORE_THAN_NOISE = 2.0
-"""[noise levels] Error of a channel that is not called noise."""
 _TOLD_LOGS = 3
 """Recordings of which a summary says what was left out."""
 

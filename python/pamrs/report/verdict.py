@@ -2,33 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pamrs.channels import unit_of
-from pamrs.findings import BlockVerdict, Findings
+from pamrs.findings import EffectFound, Findings, Part, WrongParameter
 from pamrs.recordings import Case
 from pamrs.report.text import (
+    capital,
     display_unit,
     down_to,
     effect_name,
     format_number,
     format_probability,
     is_number,
-    is_open,
     judged_place,
     kept_sentence,
-    leading,
+    listed,
     mended_sentence,
+    missed_sentence,
     name_chance,
     not_judged_words,
-    off_sentence,
-    open_chances,
+    searched,
     sentence_of,
     spoken_name,
-    told_apart,
+    unsettled_sentence,
 )
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
 _MENDED = 0.98  # share of a channel's error from which a wrong value is not said to mend it
+_MOST_MOVED = 3  # values of the rig file that are told as moved
 
 
 def unknown_volumes(rig: Rig) -> list[str]:
@@ -38,126 +41,96 @@ def unknown_volumes(rig: Rig) -> list[str]:
 
 
 def verdict(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
-    """The verdict in a few sentences, behind what the whole rig misses from its commands alone, and
-    what was not judged; ``forms`` say what a mismatch without a name is a function of, if that was
-    ``sought``.
+    """The verdict in a few sentences: what is still missed, what each group of blocks lacks, why
+    that is not settled, and what was not judged; ``forms`` say what a mismatch without a name is a
+    function of, if that was ``sought``.
     """
-    text = _of_blocks(diagnosis, case, forms, sought=sought)
-    off = off_sentence(diagnosis)
-    if off:
-        text = (
-            f"{_capital(off)}. The values of the rig, as far as they are known, do not explain "
-            f"that: something is not as the model has it, and nothing is settled. {text}"
-        )
-    told = [_capital(words) + "." for words in not_judged_words(diagnosis)]
-    return "\n\n".join([text, *told])
+    answer, first = diagnosis.answer, diagnosis.answer.parts[:1]
+    without = [p for p in answer.parts if p.group.verdict == "unlisted"]
+    main = [f"{missed_sentence(diagnosis)}." if answer.missed else ""]
+    if not first and not answer.missed:
+        main.append(_healthy(diagnosis))
+    main += [_effects(diagnosis, case), _mistaken(diagnosis)]
+    unexplained = _without_name(diagnosis, without) if without else ""
+    if first and first == without[:1]:  # what has no name leads
+        main[1:1], unexplained = [unexplained], ""
+    healthy = [p for p in answer.parts if not p.names and p not in without]
+    main += [_may_be_complete(part) for part in healthy]
+    main += [diagnosis.where.text] if first and first == healthy[:1] else []
+    main.append(unsettled_sentence(diagnosis))
+    form = _form(diagnosis, case, forms, sought=sought) if without else ""
+    ends = [f"{capital(words)}." for words in not_judged_words(diagnosis)]
+    paragraphs = [" ".join(filter(None, main)), unexplained, form, *ends]
+    return "\n\n".join(filter(None, paragraphs))
 
 
-def _of_blocks(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
-    """The verdict of the blocks, in a few sentences."""
-    kind = diagnosis.verdict
-    missing = [b for b in diagnosis.judged if b.verdict == "unlisted"]
-    if kind == "none":
-        text = (
-            f"These recordings show no missing physics{judged_place(diagnosis)}: the nominal model "
-            f"predicts {_every(diagnosis)} {down_to(diagnosis)}."
-        )
-        return text + _unsettled(diagnosis)
-    if kind == "parameters" and diagnosis.wrong_parameters:
-        found = _mistaken(diagnosis, case)
-        by = "With this value," if len(diagnosis.wrong_parameters) == 1 else "With these values,"
-        return (
-            found + _closed(diagnosis, by, case) + _beside(diagnosis, missing, forms, sought=sought)
-        )
-    if kind == "parameters":
-        shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1].moved_sigmas))[:3]
-        moved = ", ".join(f"{n} by {p.moved_sigmas:+.1f} tolerances" for n, p in shifted)
-        return (
-            f"These recordings show no missing physics{judged_place(diagnosis)}, but parameters "
-            "differ from their nominal values. With values inside their tolerances the model "
-            f"predicts {_every(diagnosis)} {down_to(diagnosis)}. Moved most: {moved}."
-            + _unsettled(diagnosis)
-        )
-    place = diagnosis.where.text
-    if kind == "unlisted":
-        tried = ", ".join(
-            f"{e.id}{f' at {e.at}' * bool(e.at)} ({e.probability:.0%})" for e in diagnosis.effects
-        )
-        text = (
-            "Physics is missing, and no effect of the catalogue explains the data well enough to "
-            f"be named{_outside(leading(diagnosis)[1])}. {place}"
-            + (f" Closest: {tried}." if tried else "")
-        )
-        if not forms and not sought:
-            return text + (
-                " No form of it was searched for: the simulator has none for a load yet."
-                if case.rig.model["load"]
-                else ""
-            )
-        if not forms:
-            return text + (
-                " No form of it carries over to other recordings, so the model stays the "
-                "refitted one."
-            )
-        closes = _closed(diagnosis, "With it in the model,", case)
-        return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
-    names = " and ".join(
-        f"{effect_name(e)} ({e.id}, probability {name_chance(diagnosis, e)})"
-        for e in diagnosis.effects
+def _healthy(diagnosis: Findings) -> str:
+    """The verdict where nothing is missing."""
+    judged = "every block that was judged" if diagnosis.not_judged else "every block"
+    shows = f"These recordings show no missing physics{judged_place(diagnosis)}"
+    if diagnosis.answer.verdict == "none":
+        return f"{shows}: the nominal model predicts {judged} {down_to(diagnosis)}."
+    far = {n: p.moved_sigmas for n, p in diagnosis.parameters.items() if p.known}
+    most = sorted(far.items(), key=lambda item: -abs(item[1]))[:_MOST_MOVED]
+    moved = ", ".join(f"{n} by {size:+.1f} tolerances" for n, size in most)
+    return (
+        f"{shows}, but parameters differ from their nominal values. With values inside their "
+        f"tolerances the model predicts {judged} {down_to(diagnosis)}."
+        + (f" Moved most: {moved}." if moved else "")
     )
-    text = f"{_opening(diagnosis, 'the model leaves out')}: {names}."
-    if any(diagnosis.where.block in b.blocks for b in missing):  # it leads with the larger mismatch
-        text = f"{place} No listed effect explains it. In addition: {text}"
-    else:
-        text += f" {place}"
-    it = "it" if len(diagnosis.effects) == 1 else "them"
-    text += _closed(diagnosis, f"With {it},", case)
-    if diagnosis.wrong_parameters:
-        text += " " + _mistaken(diagnosis, case)
+
+
+def _may_be_complete(part: Part) -> str:
+    """A group that may lack nothing, where that is open."""
+    chance = format_probability(part.probability)
+    return f"The {spoken_name(part.block or 'rig')} may lack nothing (probability {chance})."
+
+
+def _opening(diagnosis: Findings, named: Sequence[EffectFound | WrongParameter], claim: str) -> str:
+    """A claim, no surer than it is: as what is most probable where it is not settled."""
+    names = {own.term if isinstance(own, EffectFound) else own.name for own in named}
+    sure = all(p.sure for p in diagnosis.answer.parts if names & {*p.names})
+    settled = sure and not diagnosis.answer.missed
+    return capital(claim) if settled else f"Most probable is that {claim}"
+
+
+def _effects(diagnosis: Findings, case: Case) -> str:
+    """The effects that are named, where the mismatch is, and what is missed with them."""
+    found = [e for e in diagnosis.effects if e.term in diagnosis.answer.named]
+    if not found:
+        return ""
+    told = [
+        f"{effect_name(e)} ({e.id}, probability {name_chance(diagnosis, e.term)})" for e in found
+    ]
+    text = f"{_opening(diagnosis, found, 'the model leaves out')}: {listed(told)}."
+    leads = diagnosis.answer.parts[0]
+    if leads.group.effects:
+        text += f" {diagnosis.where.text}"
+    text += _closed(diagnosis, "With it," if len(found) == 1 else "With them,")
     if unknown_volumes(case.rig):
         text += (
             " The chamber's volume is not known. The recording determines the time constant and "
             "the conductance per volume; the conductance itself holds only for the placeholder "
             "volume of the rig file."
         )
-    return text + _beside(diagnosis, missing, forms, sought=sought)
+    return text
 
 
-def _every(diagnosis: Findings) -> str:
-    """The blocks that the verdict is about."""
-    return "every block that was judged" if diagnosis.not_judged else "every block"
-
-
-def _opening(diagnosis: Findings, claim: str) -> str:
-    """A claim, no surer than it is: as what is most probable where other answers are left."""
-    return f"Most probable is that {claim}" if is_open(diagnosis) else _capital(claim)
-
-
-def _outside(chance: float) -> str:
-    """How probable it is that something else acts."""
-    known = is_number(chance)
-    return f" (probability of an effect outside it: {format_probability(chance)})" if known else ""
-
-
-def _closed(diagnosis: Findings, by: str, case: Case) -> str:
+def _closed(diagnosis: Findings, by: str) -> str:
     """What the model misses then; empty where that is not known."""
     told = mended_sentence(diagnosis, by)
-    return f" {told}, on {_proof(case)}." if told else ""
+    return f" {told}, on {diagnosis.proof}." if told else ""
 
 
-def _proof(case: Case) -> str:
-    if case.held_out and case.fit:
-        return "held-out recordings"
-    return "the fitted recording (no other was given)"
-
-
-def _mistaken(diagnosis: Findings, case: Case) -> str:
+def _mistaken(diagnosis: Findings) -> str:
     """Which values of the rig file are wrong, and what that does to the error."""
+    found = diagnosis.wrong_parameters
+    if not found:
+        return ""
     told = []
     # the error is that of the model with everything that was found
-    several = len(diagnosis.wrong_parameters) > 1 or diagnosis.effects
-    beside = " with all that was found" if several else ""
-    for wrong in diagnosis.wrong_parameters:
+    beside = " with all that was found" if len(diagnosis.answer.named) > 1 else ""
+    for wrong in found:
         mended = {
             channel: e for channel, e in wrong.held_out.items() if e.after < _MENDED * e.refit
         }
@@ -169,10 +142,10 @@ def _mistaken(diagnosis: Findings, case: Case) -> str:
             for channel, e in told_by.items()
         )
         told.append(
-            f"{sentence_of(wrong)} (probability {name_chance(diagnosis, wrong)}, "
-            f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {_proof(case)} {errors}."
+            f"{sentence_of(wrong)} (probability {name_chance(diagnosis, wrong.name)}, "
+            f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {diagnosis.proof} {errors}."
         )
-    return f"{_opening(diagnosis, 'the rig file is wrong')}: " + " ".join(told)
+    return f"{_opening(diagnosis, found, 'the rig file is wrong')}: " + " ".join(told)
 
 
 def _instead(value: float, before: float, unit: str) -> str:
@@ -182,37 +155,39 @@ def _instead(value: float, before: float, unit: str) -> str:
     return f"{now} {shown} instead of {was} {shown}".replace("°", "deg")
 
 
-def _beside(
-    diagnosis: Findings, missing: list[BlockVerdict], forms: list[str], *, sought: bool
-) -> str:
-    """What stays unexplained beside a name: sets that are left, and blocks with a mismatch without
-    a name.
-    """
-    text = _unsettled(diagnosis)
-    if not missing:
-        return text
-    kept = [u for u in diagnosis.unexplained if u.verdict == "unlisted"]
-    blocks = " and ".join(name for b in missing for name in b.blocks)
-    said = [_capital(kept_sentence(u)) + "." for u in kept] or [
-        f"No listed effect explains the residual in {blocks}."
-    ]
-    text += "\n\nWhat stays unexplained. " + " ".join(said)
+def _without_name(diagnosis: Findings, without: Sequence[Part]) -> str:
+    """What stays without a name, and where."""
+    answer = diagnosis.answer
+    if answer.named:
+        kept = [u for u in diagnosis.unexplained if u.verdict == "unlisted"]
+        said = [capital(kept_sentence(u)) + "." for u in kept]
+        names = " and ".join(name for p in without for name in p.group.blocks)
+        said = said or [f"Nothing that was tried explains the residual in {names}."]
+        return "What stays unexplained. " + " ".join(said)
+    if not any(map(searched, without)):
+        return diagnosis.where.text
+    outside = without[0].probability
+    sure = f" (probability of an effect outside it: {format_probability(outside)})"
+    text = (
+        "Physics is missing, and no effect of the catalogue explains the data well enough to be "
+        f"named{sure if is_number(outside) else ''}. {diagnosis.where.text}"
+    )
+    tried = ", ".join(
+        f"{e.id}{f' at {e.at}' * bool(e.at)} ({e.probability:.0%})" for e in diagnosis.effects
+    )
+    return text + (f" Closest: {tried}." if tried else "")
+
+
+def _form(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
+    """A mismatch without a name as a form, or why there is none."""
     if forms:
-        text += " The model contains it as a form without a name: " + " ".join(forms)
-    else:
-        text += " No form of it " + (
-            "carries over to other recordings." if sought else "was searched for."
+        return (
+            "What is missing, as a form without a name, which the model contains. "
+            + " ".join(forms)
+            + _closed(diagnosis, "With it in the model,")
         )
-    return text
-
-
-def _unsettled(diagnosis: Findings) -> str:
-    """The sets that are left, as a sentence; empty where the answer is settled."""
-    if len(diagnosis.ambiguity) < 2:
-        return ""
-    apart = told_apart(diagnosis.ambiguity, open_chances(diagnosis))
-    return f" It is not settled: these recordings cannot tell {apart}."
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    if sought:
+        return "No form of it carries over to other recordings."
+    if case.rig.model["load"]:
+        return "No form of it was searched for: the simulator has none for a load yet."
+    return ""

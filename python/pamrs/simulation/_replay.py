@@ -107,7 +107,7 @@ def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
     if frame:
         drive["length"] = _held(recording, "length")
     # Where muscles pull and nothing feeds them, their measured pressure is what moves them.
-    if (frame or rig.tables("joint")) and not (valves or rig.tables("supply")):
+    if rig.tables("muscle") and not (valves or rig.tables("supply")):
         given = {}
         for name in rig.tables("chamber"):
             if _usable(recording, "muscle_pressure", name):

@@ -5,7 +5,7 @@ Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_
 `BlockLikelihood` (how probable recordings are);
 `weigh`, `explains`, `is_absent`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
 `possible_gain`, `Weighing` (their weights); `drop_undetermined`, `with_stated_std`, `is_outside`,
-`put_aside` (names that do not hold); `Judged`, `judge`, `case_verdict`, `case_probabilities`,
+`put_aside` (names that do not hold); `Judged`, `judge`, `case_probabilities`,
 `case_ambiguity`, `parameters_at_wall` (verdicts).
 """
 
@@ -34,7 +34,6 @@ from pamrs.diagnosis.evidence._verdicts import (
     Judged,
     case_ambiguity,
     case_probabilities,
-    case_verdict,
     judge,
     parameters_at_wall,
 )
@@ -63,7 +62,6 @@ __all__ = [
     "autocorrelation_of",
     "case_ambiguity",
     "case_probabilities",
-    "case_verdict",
     "drop_undetermined",
     "misses_only_held_out",
     "explains",

@@ -259,16 +259,6 @@ def _left_open(
     return found if len(found) > 1 else []
 
 
-def case_verdict(judged: Sequence[Judged]) -> str:
-    """The verdict of a case: a name wherever a block has one, what is missing without a name only
-    where there is none.
-    """
-    found = [j.verdict for j in judged]
-    if "effects" in found or any(j.wrong for j in judged):
-        return "effects" if "effects" in found else "parameters"
-    return next((verdict for verdict in ("unlisted", "parameters") if verdict in found), "none")
-
-
 def case_probabilities(judged: Sequence[Judged]) -> dict[Hypothesis, float]:
     """Probabilities of the possible answers for a case: the terms of all its blocks together.
 

@@ -15,7 +15,6 @@ from pamrs.diagnosis.evidence import (
     BlockGroup,
     Candidate,
     Judged,
-    parameters_at_wall,
     share_left,
     with_stated_std,
 )
@@ -25,7 +24,6 @@ from pamrs.diagnosis.explain._conditions import Picture, describe
 from pamrs.diagnosis.explain._forms import forms_of
 from pamrs.diagnosis.fit import (
     CHOSEN,
-    Key,
     Problem,
     concerns,
     depends,
@@ -42,18 +40,17 @@ from pamrs.diagnosis.model import (
     said_of_constants,
     with_std,
 )
-from pamrs.diagnosis.noise import NoiseLevel
-from pamrs.diagnosis.prepare import Residual, Unjudged, said_of_warm_starts
+from pamrs.diagnosis.prepare import Unjudged, said_of_warm_starts
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.effects import CATALOGUE, Hypothesis, Term, effect_of
 from pamrs.findings import (
+    HEALTHY,
     BlockResidual,
     ChannelError,
     Considered,
     EffectFound,
     EffectParameterFound,
     FitErrors,
-    NextExperiment,
     ParameterFound,
     StageError,
     Tested,
@@ -71,6 +68,8 @@ from pamrs.rig import Rig
 _LEAST_GAP = 0.05
 # [tolerances] standard deviation below which a parameter counts as determined by the recordings
 _DETERMINED_SHARE = 0.7
+# [standard deviations] moved, from which a parameter counts as determined too
+_DETERMINED_MOVE = 2.0
 
 
 Array = NDArray[np.float64]
@@ -82,7 +81,6 @@ def assemble(
     held: Problem,
     groups: list[BlockGroup],
     found: Conclusion,
-    proposal: NextExperiment,
     unjudged: Sequence[Unjudged] = (),
 ) -> Diagnosis:
     """Build the diagnosis from the groups of blocks and what was concluded of them.
@@ -97,21 +95,19 @@ def assemble(
         Gas blocks and arm, examined.
     found : Conclusion
         Model, errors, budget and free runs.
-    proposal : NextExperiment
-        What to record next.
     unjudged : sequence of Unjudged
         Blocks of the rig that are not judged.
     """
     nominal, models, judged = case.rig, found.models, found.judged
     verdict, noise_level, part = models.verdict, found.noise_level, fitted.losses.part
-    located = _located(judged)
-    picture = _picture(located, nominal, fitted, found.inside, noise_level)
     named = any(j.named or j.wrong for j in judged)
     known = models.chosen if named else models.starts
     owners = models.owners if named else owners_of_parameters(known)
     changed = models.added or any(j.wrong for j in judged)
     gap = _gap(found.table, _LEAST_GAP) if changed else None
-    blocks = block_entries(judged, fitted, found.inside, held, found.outside, noise_level)
+    blocks = block_entries(
+        judged, fitted, found.inside, held, found.outside, noise_level, found.own_errors
+    )
     forms = _forms(models, fitted)
     stages = [(fitted, found.inside)]
     if held is not fitted:
@@ -123,14 +119,12 @@ def assemble(
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
-        where=words.where(located, fitted, judged, picture, found.errors),
         effects=effects,
         ambiguity=[hypothesis.words for hypothesis in found.ambiguity],
         probabilities={str(h): p for h, p in found.probabilities.items()},
         parameters=_parameters(nominal, known, owners),
         fit=FitErrors(found.errors["fit"], found.errors["held_out"], gap),
-        next_experiment=proposal,
-        warnings=constants + _warnings(case, models, found.table, same=held is fitted) + begun,
+        warnings=constants + begun,
         rig=models.final
         if verdict == "none"
         else with_std(models.final, nominal, models.chosen, models.owners),
@@ -151,23 +145,33 @@ def assemble(
         free_traces=found.curves,
         settings=fitted.settings,
     )
-    return _worded(diagnosis, case, judged, forms)
+    told = _warnings(case, models, found.table, diagnosis.parameters, same=held is fitted)
+    diagnosis = replace(diagnosis, warnings=[*constants, *told])
+    picture = _picture(diagnosis.answer.block, found, fitted)
+    where = words.where(diagnosis.answer, fitted, judged, picture, found.errors)
+    return _worded(replace(answered(diagnosis), where=where), case, judged, forms)
 
 
-def _picture(
-    located: str | None,
-    nominal: Rig,
-    fitted: Problem,
-    found: dict[str, dict[Key, Residual]],
-    noise_level: dict[Key, NoiseLevel],
-) -> Picture:
+def answered(diagnosis: Diagnosis) -> Diagnosis:
+    """A diagnosis with the verdict and the probabilities that all of it comes to."""
+    answer, chances = diagnosis.answer, diagnosis.probabilities
+    if answer.missed:  # that nothing is missing is no answer any more
+        healthy = sum(chances.get(key, 0.0) for key in HEALTHY)
+        chances = chances | dict.fromkeys(HEALTHY, 0.0)
+        chances["unlisted"] = chances.get("unlisted", 0.0) + healthy
+        chances = dict(sorted(chances.items(), key=lambda item: -item[1]))
+    return replace(diagnosis, verdict=answer.verdict, probabilities=chances)
+
+
+def _picture(located: str | None, found: Conclusion, fitted: Problem) -> Picture:
     """Where and when the block that the answer is about is off."""
     if located is None:
         return Picture()
     block = next(b for b in fitted.blocks if b.name == located)
+    nominal, residuals = found.models.nominal, found.inside["refit"]
     return fitted.losses.part(
         "the conditions of the mismatch",
-        lambda: describe(block, fitted.recordings, nominal, found["refit"], noise_level),
+        lambda: describe(block, fitted.recordings, nominal, residuals, found.noise_level),
         Picture(),
     )
 
@@ -203,6 +207,7 @@ def _warnings(
     case: Case,
     models: Models,
     table: dict[str, ChannelError],
+    parameters: dict[str, ParameterFound],
     *,
     same: bool,
 ) -> list[str]:
@@ -211,9 +216,9 @@ def _warnings(
     return [
         *words.absolute(case),
         *words.left_out(case, models.judged),
-        *(words.reservations(models.judged, models.chosen, table) if named else []),
+        *(words.reservations(models.chosen) if named else []),
         *(words.worse(table) if models.added else []),
-        *words.warnings(case, models.judged, same),
+        *words.warnings(case, models.judged, parameters, same),
     ]
 
 
@@ -289,28 +294,6 @@ def _tested(groups: list[BlockGroup]) -> list[Tested]:
     return sorted(
         found, key=lambda a: (a.left is None, a.left if a.left is not None else -a.predicted_gain)
     )
-
-
-def _located(judged: list[Judged]) -> str | None:
-    """The block that the answer is about: that with the largest mismatch, of groups with a name or
-    without one; else one at a wall.
-    """
-    told = [j for j in judged if j.named or j.wrong or j.verdict == "unlisted"]
-    for groups in ([j.group for j in told], [j.group for j in judged]):
-        found = [
-            (g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name)
-            for g in groups
-            if g.mismatch
-        ]
-        if found:
-            return max(found)[1]
-    for j in sorted(judged, key=lambda j: not j.wrong):
-        moved = parameters_at_wall(j.group)
-        worst = j.wrong or tuple(sorted(moved, key=lambda n: -abs(moved[n])))
-        for block in reversed(j.group.blocks):
-            if worst and depends(block, worst[0]):
-                return block.name
-    return None
 
 
 def _gap(table: dict[str, ChannelError], least: float) -> float | None:
@@ -492,13 +475,14 @@ def _parameters(
     known = known_parameters(nominal)
     for name, k in owners.items():
         p, own = known[name], candidates[k].fit
+        moved = abs(own.values[name] - p.value)
         out[name] = ParameterFound(
             nominal=p.value,
             value=own.values[name],
             std=own.std[name],
             unit=p.unit,
             moved_sigmas=(own.values[name] - p.value) / p.tol,
-            identifiable=own.std[name] < _DETERMINED_SHARE * p.tol,
+            identifiable=own.std[name] < max(_DETERMINED_SHARE * p.tol, moved / _DETERMINED_MOVE),
         )
     return out
 

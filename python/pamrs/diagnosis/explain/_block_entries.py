@@ -4,14 +4,14 @@ after.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from pamrs.channels import unit_of
-from pamrs.diagnosis.evidence import Judged, significant
+from pamrs.diagnosis.evidence import Judged, parameters_at_wall, significant
 from pamrs.diagnosis.explain._conditions import describe
 from pamrs.diagnosis.explain._words import TELLING_CONDITION
-from pamrs.diagnosis.fit import Key, Problem
+from pamrs.diagnosis.fit import Key, Problem, concerns, depends
 from pamrs.diagnosis.noise import NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual, Unjudged
 from pamrs.findings import (
@@ -24,6 +24,7 @@ from pamrs.findings import (
     MismatchSize,
     MismatchStages,
     Unexplained,
+    left_of,
 )
 from pamrs.rig import Rig
 
@@ -37,6 +38,7 @@ def block_entries(
     held: Problem,
     out_found: Stages,
     noise_level: dict[Key, NoiseLevel],
+    own_errors: Mapping[str, float],
 ) -> list[BlockVerdict]:
     """One entry for each group of blocks.
 
@@ -50,14 +52,14 @@ def block_entries(
         Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
     noise_level : dict
         Noise by block and recording.
+    own_errors : mapping of str to float
+        What the error of the model does to each channel.
     """
 
     def mismatch(block: Block) -> BlockMismatch:
         outside = None if held is fitted else _sizes(block, held, out_found, noise_level)
         inside = _sizes(block, fitted, fit_found, noise_level)
-        levels = [noise_level[block.name, p.recording.name] for p in fitted.recordings]
-        error = math.sqrt(sum(own.error_variance for own in levels) / len(levels))
-        unit = unit_of(block.channel)
+        unit, error = unit_of(block.channel), own_errors[block.channel]
         return BlockMismatch(block.name, block.channel, unit, inside, outside, error)
 
     return [
@@ -69,9 +71,24 @@ def block_entries(
             wrong_parameters=list(j.wrong),
             ambiguity=[hypothesis.words for hypothesis in j.ambiguity],
             mismatch=[mismatch(b) for b in j.group.blocks],
+            block=_located(j),
         )
         for j in judged
     ]
+
+
+def _located(judged: Judged) -> str | None:
+    """The block of a group that has the mismatch; without one that of a value that is wrong, or at
+    the wall of its tolerance.
+    """
+    group = judged.group
+    if group.mismatch is not None:
+        return group.mismatch.name
+    moved = parameters_at_wall(group)
+    worst = judged.wrong or tuple(sorted(moved, key=lambda name: -abs(moved[name])))
+    told = [b.name for b in group.blocks if worst and depends(b, worst[0])]
+    named = [b.name for b in group.blocks if any(concerns(term, b) for term in judged.named)]
+    return next(iter([*reversed(told), *named]), None)
 
 
 def not_judged(block: Unjudged) -> BlockVerdict:
@@ -149,7 +166,7 @@ def unexplained(
             continue
         suspects = {b.name: b for b in j.group.suspects}
         for own in (m for m in entry.mismatch if m.block in suspects):
-            left = _left(own, entry.verdict, stages)
+            left = _left(own, entry.verdict, stages, errors)
             if left is None:
                 continue
             stage, problem, residual, role = left
@@ -175,18 +192,21 @@ def unexplained(
 
 
 def _left(
-    own: BlockMismatch, verdict: str, stages: list[tuple[Problem, Stages]]
+    own: BlockMismatch,
+    verdict: str,
+    stages: list[tuple[Problem, Stages]],
+    errors: Mapping[str, Mapping[str, ChannelError]],
 ) -> tuple[str, Problem, dict[Key, Residual], str] | None:
     """The stage by which a block keeps something, and the recordings that show it with their role;
     None where it is no more than noise.
     """
     # a form without a name takes up what no name explains, and is no explanation
     stage = "refit" if verdict == "unlisted" else "after"
-    parts = [(own.held_out, "held_out"), (own.fitted, "fit")]
-    there = [(part, role) for part, role in parts if part is not None]
-    for (part, role), (problem, residuals) in zip(there, stages, strict=True):
-        size: MismatchSize = part[stage]
-        if size.more_than_noise:
+    parts = {"held_out": own, "fit": replace(own, held_out=None)}
+    if own.held_out is None:
+        del parts["held_out"]
+    for (role, part), (problem, residuals) in zip(parts.items(), stages, strict=True):
+        if left_of(part, errors[role][own.channel], stage) == "more":
             return stage, problem, residuals[stage], role
     return None
 

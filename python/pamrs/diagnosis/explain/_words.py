@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from pamrs.channels import channel_of, unit_of
@@ -11,7 +13,7 @@ from pamrs.diagnosis.fit import Problem, concerns
 from pamrs.diagnosis.model import spoiled_channels
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import CATALOGUE, UNDECIDED, UNLISTED
-from pamrs.findings import ChannelError, Where
+from pamrs.findings import Answer, ChannelError, ParameterFound, Where
 from pamrs.recordings import Case
 from pamrs.report.text import (
     display_unit,
@@ -24,8 +26,6 @@ from pamrs.report.text import (
 from pamrs.report.verdict import unknown_volumes
 from pamrs.rig.schema import split_name
 
-# [noise levels] error of a model with a name from which it is reported with a reservation
-_MISSED_NOISES = 3.0
 _MOVED_TOLERANCES = 2.0  # [tolerances] movement of a parameter beside an effect from which it is
 # relative scatter of an effect's size between recordings from which it is reported
 _SCATTER = 0.35
@@ -40,7 +40,7 @@ TELLING_CONDITION = 1.15
 
 
 def where(
-    located: str | None,
+    answer: Answer,
     problem: Problem,
     judged: list[Judged],
     picture: Picture,
@@ -49,12 +49,14 @@ def where(
     """The ``where`` entry: block, channel, intervals, conditions and a sentence, which has the
     block's error of the table of ``errors`` that proves the answer.
     """
-    groups = [j.group for j in judged]
+    groups, located = [j.group for j in judged], answer.block
     if located is None:
         text = (
             "After the refit, no block's residual is above the noise level, with the error that is "
             "taken for the model's own."
         )
+        if answer.missed:
+            text += " From its commands alone the whole rig misses more."
         return Where(text=text)
     block = next(b for b in problem.blocks if b.name == located)
     proof = errors["held_out"] or errors["fit"]
@@ -132,7 +134,12 @@ def _unnamed(name: str) -> str:
     return f"{block}.{key}"
 
 
-def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
+def warnings(
+    case: Case,
+    judged: list[Judged],
+    parameters: Mapping[str, ParameterFound],
+    no_held_out: bool,
+) -> list[str]:
     """What a reader should know about the data and the fit."""
     out = []
     groups = [j.group for j in judged]
@@ -153,6 +160,8 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
                     "are in?"
                 )
     for name, value in sorted(symptoms.items(), key=lambda kv: -abs(kv[1])):
+        if name in parameters and not parameters[name].known:
+            continue
         what = (
             "a symptom of another wrong value or of missing physics"
             if mistaken
@@ -228,39 +237,14 @@ def worse(table: dict[str, ChannelError]) -> list[str]:
     return out
 
 
-def reservations(
-    judged: list[Judged],
-    chosen: list[Candidate],
-    table: dict[str, ChannelError],
-) -> list[str]:
-    """What a reader should know of a model with a name: what it still misses where it acts, and
-    values that it had to move far.
-    """
-    out = []
-    for j in judged:
-        if not (j.named or j.wrong):
-            continue
-        for channel in dict.fromkeys(b.channel for b in j.group.blocks):
-            error = table[channel]
-            if error.after <= _MISSED_NOISES * error.noise:
-                continue
-            what = "the effect" if j.named else "the other value"
-            times = error.after / error.noise
-            why = "its equation is not the whole truth" if j.named else "something else acts"
-            name = "" if j.ambiguity else "the name remains, but "
-            out.append(
-                f"with {what} the model still misses {spoken_name(channel)} by {times:.2g} "
-                f"times the noise level: {name}{why}, and standard deviations do not include that"
-            )
+def reservations(chosen: list[Candidate]) -> list[str]:
+    """Values that a model with a name had to move far."""
     named = [c for c in chosen if any(effect.id in CATALOGUE for effect in c.effects)]
     moved = {
         n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > _MOVED_TOLERANCES
     }
-    out += [
-        (
-            f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may compensate for the "
-            "effect's form"
-        )
+    return [
+        f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may compensate for the "
+        "effect's form"
         for n, v in moved.items()
     ]
-    return out

@@ -22,7 +22,6 @@ from pamrs.diagnosis.evidence import (
     autocorrelation_of,
     case_ambiguity,
     case_probabilities,
-    case_verdict,
     drop_undetermined,
     is_outside,
     judge,
@@ -50,11 +49,20 @@ from pamrs.diagnosis.model._budget import budget
 from pamrs.diagnosis.model._free_run import KnownValues, free_run
 from pamrs.diagnosis.model._owners import owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.noise import NoiseLevel
-from pamrs.diagnosis.prepare import Residual
+from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import CATALOGUE, NONE, PARAMETERS, Hypothesis, Term
+from pamrs.effects import CATALOGUE, NONE, PARAMETERS, UNDECIDED, UNLISTED, Hypothesis, Term
 from pamrs.errors import SimulationError
-from pamrs.findings import BudgetTerm, ChannelError, FreeRun, Trace, channels_off
+from pamrs.findings import (
+    HEALTHY,
+    MOST_MISSED,
+    BudgetTerm,
+    ChannelError,
+    FreeRun,
+    Trace,
+    beyond,
+    case_verdict,
+)
 from pamrs.rig import Rig
 
 # [tolerances] of two groups about one sensor's zero that refits the vaguer (decision 22)
@@ -141,6 +149,9 @@ class Conclusion:
         What is to be said beside them.
     curves : list of Trace
         Those of the recording that the nominal model misses most.
+    own_errors : dict of str to float
+        What the error that is taken for the model's own does to each channel, one standard
+        deviation, SI.
     """
 
     models: Models
@@ -154,6 +165,7 @@ class Conclusion:
     runs: list[FreeRun] | None
     runs_note: str
     curves: list[Trace]
+    own_errors: dict[str, float]
 
     @property
     def judged(self) -> list[Judged]:
@@ -164,11 +176,6 @@ class Conclusion:
     def table(self) -> dict[str, ChannelError]:
         """Errors that the answer is proven by: held-out ones where there are any."""
         return self.errors["held_out"] or self.errors["fit"]
-
-    @property
-    def off(self) -> list[str]:
-        """Channels that the whole rig misses from its commands alone, the worst first."""
-        return list(channels_off(self.runs or []))
 
     def hypotheses(self, problem: Problem) -> list[tuple[str, Rig, float]]:
         """The likely hypotheses that have a model: label, rig and probability."""
@@ -210,7 +217,17 @@ def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGro
         runs,
         note,
         curves,
+        _own_errors(fitted, noise_level),
     )
+
+
+def _own_errors(problem: Problem, noise_level: dict[Key, NoiseLevel]) -> dict[str, float]:
+    """What the error that is taken for the model's own does to each channel [SI]."""
+    found = {}
+    for block in problem.blocks:
+        levels = [noise_level[block.name, p.recording.name] for p in problem.recordings]
+        found[block.channel] = math.sqrt(sum(own.error_variance for own in levels) / len(levels))
+    return found
 
 
 def _sound_models(
@@ -220,28 +237,31 @@ def _sound_models(
     groups: list[BlockGroup],
     noise_level: dict[Key, NoiseLevel],
 ) -> tuple[Models, dict[str, dict[Key, Residual]], dict[str, dict[Key, Residual]]]:
-    """The rig at every stage with names that spoil no channel, and the residuals of the recordings
-    to fit and of the held-out ones.
+    """The rig at every stage with answers that its errors bear out, and the residuals of the
+    recordings to fit and of the held-out ones.
 
-    What leads a group and predicts a channel worse than the model without it does, or calls a value
-    wrong that the model has inside its tolerances, is put aside, and the group is judged again
-    without it.
+    What leads a group and predicts a channel worse than the model without it does, its blocks worse
+    than the model of the rig file, or calls a value wrong that the model has inside its tolerances,
+    is put aside; that nothing is missing is, where the model misses far more than noise and its own
+    error. The group is judged again without it.
     """
-    settings = fitted.settings
+    settings, errors = fitted.settings, _own_errors(fitted, noise_level)
     groups = [drop_undetermined(group, fitted) for group in groups]
     while True:
         judged = judge(groups, settings)
-        models = _models(nominal, fitted, judged, case_verdict(judged))
+        models = _models(nominal, fitted, judged, case_verdict(j.verdict for j in judged))
         inside = models.residuals(fitted)
         outside = inside if held is fitted else models.residuals(held)
         problem, found = (fitted, inside) if held is fitted else (held, outside)
-        spoilt = spoiled_channels(_table(problem, found, noise_level))
-        blamed = _blamed(models.judged, spoilt) | _needless(models, settings)
-        if not blamed:
+        table = _table(problem, found, noise_level)
+        blamed = _blamed(models.judged, spoiled_channels(table)) | _needless(models, settings)
+        blamed |= _worse_than_file(models.judged, table, settings.noise_margin - 1.0)
+        missing = {k: _missed(j, table, errors) for k, j in enumerate(models.judged)}
+        if not blamed and not any(missing.values()):
             return models, inside, outside
         groups = [
-            _without_name(group, models.judged[k]) if k in blamed else group
-            for k, group in enumerate(groups)
+            _without_name(own, models.judged[k]) if k in blamed else _with_mismatch(own, missing[k])
+            for k, own in enumerate(groups)
         ]
 
 
@@ -262,6 +282,50 @@ def _without_name(group: BlockGroup, judged: Judged) -> BlockGroup:
     if judged.added:
         return put_aside(group, judged.chosen.hypothesis)
     return replace(group, closure=None)
+
+
+def _worse_than_file(
+    judged: list[Judged], table: dict[str, ChannelError], margin: float
+) -> set[int]:
+    """Groups whose names predict the blocks in which they act worse than the model of the rig file,
+    by more than this share of the noise's variance.
+    """
+    found = set()
+    for k, one in enumerate(judged):
+        acting = [b for b in one.group.blocks if any(concerns(t, b) for t in one.added)]
+        errors = [table[b.channel] for b in acting]
+        lost = [(e.after**2 - e.before**2) / e.noise**2 - margin for e in errors]
+        if lost and sum(lost) > 0.0:
+            found.add(k)
+    return found
+
+
+def _missed(
+    judged: Judged, table: dict[str, ChannelError], own_errors: dict[str, float]
+) -> list[Block]:
+    """Blocks of a group of which nothing is said to be missing, though the refitted model misses
+    far more than noise and its own error; the worst first.
+    """
+    if judged.verdict not in HEALTHY or judged.wrong:
+        return []
+
+    def more(block: Block) -> float:
+        error = table[block.channel]
+        size = min(error.refit, error.after)
+        return beyond(size, error.noise, own_errors[block.channel])
+
+    found = [block for block in judged.group.blocks if more(block) > MOST_MISSED]
+    return sorted(found, key=more, reverse=True)
+
+
+def _with_mismatch(group: BlockGroup, missed: list[Block]) -> BlockGroup:
+    """A group of which something is missing after all: nobody looked for its name."""
+    if not missed:
+        return group
+    chances = dict(group.probabilities)
+    lost = chances.pop(UNDECIDED, 0.0)
+    chances[UNLISTED] = chances.get(UNLISTED, 0.0) + lost
+    return replace(group, probabilities=chances, mismatch=missed[0], suspects=missed)
 
 
 def _blamed(judged: list[Judged], spoilt: Collection[str]) -> set[int]:

@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from pamrs.channels import channel_of, dotted, recorded_as, unit_of
 from pamrs.diagnosis.fit import Events, Key, Problem, with_known
 from pamrs.diagnosis.prepare import Prepared, Residual
-from pamrs.effects import EFFECTS
+from pamrs.effects import EFFECTS, ports_of
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.findings import FreeRun, FreeRunError, Trace
 from pamrs.recordings import Recording
@@ -193,6 +193,9 @@ def _judged(
     ]
     if known is None or not doubtful:
         return run
+    if _is_ahead(final, run.seconds):
+        note = "a clock ahead of its commands cannot be simulated: what is missed says nothing"
+        return replace(run, note=f"{run.note}; {note}" if run.note else note)
     logged, note = _as_logged(prepared.recording), run.note
     if len(logged) > _OFF_SAMPLES:
         logged = logged.between(stop=float(logged.time[_OFF_SAMPLES]))
@@ -202,6 +205,12 @@ def _judged(
     off = {name for name in doubtful if left.get(name, math.inf) > _OFF_NOISES}
     channels = {n: replace(e, off=n in off) for n, e in run.channels.items()}
     return replace(run, channels=channels, note=note)
+
+
+def _is_ahead(rig: Rig, seconds: float) -> bool:
+    """Whether a rig has a clock that is ahead of its commands in a recording of some length."""
+    clocks = [effect["parameters"] for effect in rig.effects if "clock" in ports_of(effect)]
+    return any(min(p["offset"], p["offset"] + p["rate"] * seconds) < 0.0 for p in clocks)
 
 
 def _left(
@@ -214,6 +223,7 @@ def _left(
     Steps of Gauss and Newton inside that distance, each tried by a simulation.
     """
     begun, count = _begun(final, prepared), len(known.names)
+    compared = _compared(prepared, logged)
 
     def run(moved: Array) -> dict[str, Array]:
         values = dict(zip(known.names, known.values + known.root @ moved[:count], strict=True))
@@ -221,7 +231,7 @@ def _left(
         warm = zip(begun.items(), moved[count + 1 :].tolist(), strict=True)
         begins = {name: there.kelvin + there.unsure * away for (name, there), away in warm}
         there = with_known(final, values)
-        return _misses(there, late, begins, logged, prepared.noise, _OFF_ROWS)
+        return _misses(there, late, begins, compared, prepared.noise, _OFF_ROWS)
 
     at, least = np.zeros(count + 1 + len(begun)), dict[str, float]()
     with contextlib.suppress(PamrsError, ArithmeticError):  # a model that leaves its range
@@ -365,6 +375,14 @@ def said_of_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[s
     ]
 
 
+def _compared(prepared: Prepared, logged: Recording) -> Recording:
+    """A recording at the rate of its log without the beginnings that no block is judged by."""
+    masks, time = dict(logged.mask), logged.time - logged.time[0]
+    for channel, count in prepared.unsettled.items():
+        masks[channel] = masks[channel] & (time >= count * prepared.dt)
+    return replace(logged, mask=masks)
+
+
 def _as_logged(recording: Recording) -> Recording:
     """A recording of means at the rate of its log: commands as they were, measurements at the
     instants that the means belong to.
@@ -411,7 +429,7 @@ def _errors(
     try:
         begins = {name: begin.kelvin for name, begin in _begun(rig, prepared).items()}
         run = replay(rig, logged, temperatures=begins, record=_measured(rig, logged))
-        return differences(run, logged), "", run
+        return differences(run, _compared(prepared, logged)), "", run
     except RecordingError:
         raise
     except (PamrsError, ArithmeticError) as error:

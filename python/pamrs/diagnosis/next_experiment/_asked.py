@@ -14,7 +14,7 @@ import numpy as np
 from pamrs.channels import block_of
 from pamrs.diagnosis.evidence import Judged
 from pamrs.diagnosis.fit import Problem, concerns, without_term
-from pamrs.diagnosis.next_experiment._choice import Modelled, apart, outcome_of, propose, spoken
+from pamrs.diagnosis.next_experiment._choice import Modelled, apart, outcome_of, propose
 from pamrs.diagnosis.next_experiment._differences import noise_of
 from pamrs.diagnosis.next_experiment._words import words
 from pamrs.diagnosis.prepare import Block, Prepared
@@ -30,8 +30,8 @@ from pamrs.experiments import (
     joined,
     protocol_of,
 )
-from pamrs.findings import HEALTHY, NextExperiment, PairExperiment
-from pamrs.report.text import spoken_name
+from pamrs.findings import Answer, Findings, NextExperiment, PairExperiment, Part
+from pamrs.report.text import capital, hypothesis_label, left_in, spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, regulators_of
@@ -176,11 +176,11 @@ class _Question:
         """What to record about a block, behind the words that say why."""
         what, shows, experiment = self.experiment(block, terms)
         kind = {"kind": _telling(block, self.nominal, terms).kind, "block": block.name}
-        text = f"{begin}: {what}; {shows}."
+        text, instruction = f"{begin}: {what}; {shows}.", f"{capital(what)}."
         if experiment is None:
-            return NextExperiment(text, kind)
-        excitation = kind | experiment.excitation
-        return NextExperiment(text, excitation, protocol=protocol_of(experiment))
+            return NextExperiment(text, kind, instruction=instruction)
+        excitation, played = kind | experiment.excitation, protocol_of(experiment)
+        return NextExperiment(text, excitation, protocol=played, instruction=instruction)
 
     def _made(self, names: tuple[str, ...]) -> Experiment | None:
         """The first experiment of some names that the library makes for this rig; None where it
@@ -198,21 +198,20 @@ class _Question:
 
 
 def next_to_record(
-    verdict: str,
+    diagnosis: Findings,
     ambiguity: list[Hypothesis],
     hypotheses: Sequence[Modelled],
     nominal: Rig,
     judged: list[Judged],
     fitted: Problem,
     held: Problem,
-    off: Sequence[str] = (),
 ) -> NextExperiment:
     """What to record next.
 
     Parameters
     ----------
-    verdict : str
-        Of the case.
+    diagnosis : Findings
+        What was found: its answer is asked about.
     ambiguity : list of Hypothesis
         Those that are left open.
     hypotheses : sequence of (label, rig, probability)
@@ -223,8 +222,6 @@ def next_to_record(
         The groups with their verdicts.
     fitted, held : Problem
         Recordings to fit and held-out ones (the same object when there are no others).
-    off : sequence of str
-        Channels that the whole rig misses from its commands alone, the worst first.
 
     Returns
     -------
@@ -235,7 +232,8 @@ def next_to_record(
     asked = _Question(nominal, judged, fitted.blocks, recordings, fitted)
     same = same_data(ambiguity)
     simulated: NextExperiment | None = None
-    if ambiguity and len(hypotheses) > 1 and not same:
+    first = _first_asked(diagnosis.answer)
+    if first is not None and len(first.left) > 1 and len(hypotheses) > 1 and not same:
         with contextlib.suppress(
             DiagnosisError, ParameterError, SimulationError
         ):  # a rig that no experiment of the library suits
@@ -255,51 +253,59 @@ def next_to_record(
         return replace(simulated, pairs=pairs)
     if same:
         return NextExperiment(same, pairs=pairs)
-    return replace(_without_models(asked, verdict, ambiguity, off), pairs=pairs)
+    return replace(_without_models(asked, diagnosis), pairs=pairs)
 
 
-def _without_models(
-    asked: _Question, verdict: str, ambiguity: list[Hypothesis], off: Sequence[str]
-) -> NextExperiment:
+def _first_asked(answer: Answer) -> Part | None:
+    """The group of blocks that is asked about first: one that still misses much, one with several
+    answers left, one without a name; else the one that leads, if anything does.
+    """
+    missed = (answer.part_of(own.block) for own in answer.missed if own.block)
+    open_ = (part for part in answer.parts if len(part.left) > 1)
+    nameless = (part for part in answer.parts if part.group.verdict == "unlisted")
+    rest = () if answer.missed else answer.parts
+    return next(filter(None, itertools.chain(missed, open_, nameless, rest)), None)
+
+
+def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
     """What to record where no two hypotheses could be simulated."""
-    missing = [
-        j.group.mismatch
-        for j in asked.judged
-        if j.verdict == "unlisted" and j.group.mismatch is not None
-    ]
-    if not ambiguity and verdict != "unlisted" and not missing and off:
-        return _of_whole(asked, off[0])
-    if not ambiguity and verdict != "unlisted" and not missing:
-        several = sum(len(j.added) for j in asked.judged) > 1
-        text = (
-            "The names are settled by these recordings; no further one is needed for them."
-            if several and verdict not in HEALTHY
-            else f"The {'answer' if verdict in HEALTHY else 'name'} is settled by these "
-            "recordings; no further one is needed for it."
-        )
+    answer = diagnosis.answer
+    part = _first_asked(answer)
+    nameless = part is not None and part.group.verdict == "unlisted"
+    if answer.settled and not nameless:
+        what = "answer" if not answer.named else "names" if len(answer.named) > 1 else "name"
+        settled = "are settled" if what == "names" else "is settled"
+        text = f"The {what} {settled} by these recordings; no further one is needed."
         return NextExperiment(text, {}, 0.0)
-    terms = [term for hypothesis in ambiguity for term in hypothesis.terms]
-    named = not any(hypothesis.rest for hypothesis in ambiguity)
-    if terms and named and all(term.is_value for term in terms):
-        return NextExperiment(_measured(terms) + ".")
-    settled = not ambiguity and verdict != "unlisted"
-    block = missing[0] if missing and not ambiguity else asked.place(terms)
-    if not settled:
-        return asked.answer(f"For the {spoken_name(block.name)}", block, terms)
-    rest = " and ".join(dict.fromkeys(spoken_name(b.name) for b in missing))
-    begin = f"The name is settled. For the rest of the residual in the {rest}"
-    return asked.answer(begin, block, terms)
+    if part is None:
+        return _of_whole(asked, diagnosis)
+    left = [Hypothesis.of(own) for own, _ in part.left]
+    terms = [term for hypothesis in left for term in hypothesis.terms]
+    values = all(term.is_value for term in terms) and all(h.terms and not h.rest for h in left)
+    if len(left) > 1 and values:
+        return NextExperiment(_measured(list(dict.fromkeys(terms))) + ".")
+    missed = [own.block for own in answer.missed if own.block in part.group.blocks]
+    name = next(iter([*missed, part.block]))
+    block = next((b for b in asked.blocks if b.name == name), asked.blocks[-1])
+    begin = "The name is settled. " if answer.named and answer.settled else ""
+    return asked.answer(f"{begin}For the {spoken_name(block.name)}", block, terms)
 
 
-def _of_whole(asked: _Question, channel: str) -> NextExperiment:
-    """What to record where the blocks fit one by one and the whole rig misses a channel."""
+def _of_whole(asked: _Question, diagnosis: Findings) -> NextExperiment:
+    """What to record where the blocks fit one by one and the whole rig misses channels: about the
+    block that keeps more than noise, or else the first one along the chain, from which the error
+    goes on to the others.
+    """
+    off = [own.channel for own in diagnosis.answer.missed]
+    there = [b for b in asked.blocks if b.channel in off]
+    kept = [b for b in asked.blocks if left_in(diagnosis, b.name) == "more"]
+    block = next(iter([*kept, *there]), None)
+    channel = block.channel if block else off[0]
     begin = f"The whole rig misses the {spoken_name(channel)}, and no judged block shows why"
-    block = next((b for b in asked.blocks if b.channel == channel), None)
     if block is None:
-        return NextExperiment(
-            f"{begin}: record the channels between it and the commands as well, so that "
-            "the blocks that were not judged can be."
-        )
+        what = "record the channels between it and the commands as well"
+        text = f"{begin}: {what}, so that the blocks that were not judged can be."
+        return NextExperiment(text, instruction=f"{capital(what)}.")
     return asked.answer(f"{begin}. For the {spoken_name(block.name)}", block)
 
 
@@ -358,13 +364,14 @@ def _pair(
                 kind,
             )
         effect = next((term for term in differing if term.is_effect), None)
-        why = f" {spoken(str(effect))}: {effect.info.separates}." if effect else ""
+        why = f" {hypothesis_label(str(effect))}: {effect.info.separates}." if effect else ""
         return PairExperiment(
             labels, f"For the {spoken_name(block.name)}: {what}; {shows}.{why}", kind
         )
     listed = other if one == UNLISTED else one
+    name = hypothesis_label(str(listed))
     text = (
-        f"For the {spoken_name(block.name)}: {what}. A model with {spoken(str(listed))} has to "
+        f"For the {spoken_name(block.name)}: {what}. A model with {name} has to "
         "predict that to the noise without another fit; what it misses is not listed"
     )
     values = [term for term in listed.terms if term.is_value]
@@ -372,7 +379,7 @@ def _pair(
     if missed is not None:
         channel, size = missed
         text += (
-            f" (without {spoken(str(listed))} the model would miss the {spoken_name(channel)} by "
+            f" (without {name} the model would miss the {spoken_name(channel)} by "
             f"{size:.2g} times the noise level)"
         )
     text += f". {_measured(values)}." if values else "."

@@ -38,12 +38,12 @@ from pamrs.diagnosis.next_experiment._differences import (
 )
 from pamrs.diagnosis.prepare import Prepared
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import Hypothesis, Term
+from pamrs.effects import Term
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments import Experiment, experiments_of, protocol_of
 from pamrs.findings import Curves, NextExperiment, PairExperiment, RankedExperiment
 from pamrs.recordings import Recording
-from pamrs.report.text import spoken_name
+from pamrs.report.text import hypothesis_label, spoken_name
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig, reading
 
@@ -389,6 +389,7 @@ def propose(
         curves=_curves(best, chosen),
         pairs=_pairs(best_first, chosen),
         protocol=protocol_of(best.experiment),
+        instruction=f"{_instruction(best)}.",
     )
 
 
@@ -438,9 +439,9 @@ def _pairs(outcomes: Sequence[Outcome], hypotheses: Sequence[Modelled]) -> list[
         (one, first, _), (other, second, _) = hypotheses[i], hypotheses[j]
         _, size = apart(outcome, i, j, nested=_nested(first, second))
         text = (
-            f"{_instruction(outcome)}. If it is {spoken(one)}, a model with "
-            f"{spoken(other)} then misses the {_missed(outcome, i, j)}; the other way round it "
-            f"misses the {_missed(outcome, j, i)}."
+            f"{_instruction(outcome)}. If it is {hypothesis_label(one)}, a model with "
+            f"{hypothesis_label(other)} then misses the {_missed(outcome, i, j)}; the other way "
+            f"round it misses the {_missed(outcome, j, i)}."
         )
         found.append(PairExperiment([one, other], text, outcome.experiment.name, size))
     return found
@@ -516,33 +517,12 @@ def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> li
     ]
 
 
-_WITHOUT_NAME = {
-    "none": "nothing missing",
-    "parameters": "parameters inside their tolerances",
-    "unlisted": "an effect outside the catalogue",
-}
-"""What is said without a name, in words."""
-
-
-def spoken(label: str) -> str:
-    """A hypothesis in words, from its text."""
-    hypothesis = Hypothesis.parse(label)
-
-    def name(term: Term) -> str:
-        if term.is_effect:
-            return term.info.name + (f" at {term.at}" if term.at else "")
-        return f"another {spoken_name(term.id)}" if term.is_value else str(term)
-
-    rest = [_WITHOUT_NAME[hypothesis.rest]] if hypothesis.rest else []
-    return " with ".join([*map(name, hypothesis.terms), *rest])
-
-
 def _text(best: Outcome, hypotheses: Sequence[Modelled], uncertainty: float) -> str:
     # of the leading pair: what the second one cannot explain of what the first one does
     j = min(range(1, len(hypotheses)), key=lambda k: (-round(hypotheses[k][2], 2), k))
     said = (
-        f"{_instruction(best)}. If it is {spoken(hypotheses[0][0])}, a model with "
-        f"{spoken(hypotheses[j][0])} then misses the {_missed(best, 0, j)}, whatever its "
+        f"{_instruction(best)}. If it is {hypothesis_label(hypotheses[0][0])}, a model with "
+        f"{hypothesis_label(hypotheses[j][0])} then misses the {_missed(best, 0, j)}, whatever its "
         f"parameters. The expected information is {best.bits:.2f} of the {uncertainty:.2f} bit of "
         "doubt between the hypotheses that were fitted."
     )
