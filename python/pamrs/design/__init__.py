@@ -17,6 +17,7 @@ Searches need ``pip install 'pamrs[search]'``, which is imported when it is used
 
 from __future__ import annotations
 
+from pamrs.design import sizing
 from pamrs.design._evaluator import Genetic, History, Search
 from pamrs.design._filling import Filling
 from pamrs.design._joint_design import (
@@ -65,4 +66,5 @@ __all__ = [
     "optimise",
     "pareto_front",
     "search",
+    "sizing",
 ]
