@@ -23,6 +23,7 @@ from pamrs.report.text import (
 )
 from pamrs.report.verdict import unknown_volumes
 from pamrs.rig.schema import split_name
+from pamrs.units import in_words
 
 # [noise levels] error of a model with a name from which it is reported with a reservation
 _MISSED_NOISES = 3.0
@@ -148,7 +149,8 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
             largest = float(np.nanmax(np.abs(values[recording.mask[channel]])))
             if largest < _LEAST_PRESSURE:
                 out.append(
-                    f"{recording.name}: {channel} never exceeds {largest:.3g} Pa gauge, next to "
+                    f"{recording.name}: {channel} never exceeds "
+                    f"{in_words(recording.said.get(channel, ''), 'Pa', largest)} gauge, next to "
                     "nothing for a muscle or a tank: is the unit in its header the one its values "
                     "are in?"
                 )
@@ -196,16 +198,19 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
 def absolute(case: Case) -> list[str]:
     """Muscle pressures that begin at one atmosphere in every recording: they may not be gauge."""
     ambient = float(case.rig.model["gas"]["ambient_pressure"])
-    firsts: dict[str, list[float]] = {}
+    firsts, said = dict[str, list[float]](), dict[str, str]()
     for recording in case.recordings:
         for channel, values in recording.channels.items():
             rows = recording.mask[channel]
             if channel_of(channel) == "muscle_pressure" and rows.any():
+                said[channel] = recording.said.get(channel, "")
                 firsts.setdefault(channel, []).append(float(values[rows][0]))
     return [
-        f"{channel} begins at {np.mean(begun):.4g} Pa in every recording, one atmosphere "
-        f"(gas.ambient_pressure = {ambient:g} Pa): are these absolute pressures? Gauge pressures "
-        "are needed; what is found below may be no more than the difference"
+        f"{channel} begins at {in_words(said[channel], 'Pa', float(np.mean(begun)))} in every "
+        "recording, one atmosphere (gas.ambient_pressure = "
+        f"{case.rig.units.said('gas.ambient_pressure', 'Pa', ambient, digits='.6g')}): are these "
+        "absolute pressures? Gauge pressures are needed; what is found below may be no more than "
+        "the difference"
         for channel, begun in firsts.items()
         if all(abs(first - ambient) < _AMBIENT_SHARE * ambient for first in begun)
     ]

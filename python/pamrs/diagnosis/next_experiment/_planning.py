@@ -212,6 +212,7 @@ def plan_diagnosis(
         pairs=pairs,
         groups=_joined([(a, b) for a, b, _ in pairs], order),
         additions=assumed.additions(own, every, chosen, usable),
+        units=rig.units,
     )
 
 
