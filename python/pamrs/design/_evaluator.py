@@ -148,6 +148,9 @@ class Evaluator:
         if made:
             points = self.lower + np.clip(rows[:made], 0.0, 1.0) * (self.upper - self.lower)
             values[:made] = self.objective(points)
+            if np.isnan(values[:made]).any():
+                bad = points[np.isnan(values[:made])][0]
+                raise ParameterError(f"objective: its value at {bad.tolist()} is not a number")
             self.used += made
             index = int(np.argmin(values[:made]))
             value, point = float(values[index]), points[index]

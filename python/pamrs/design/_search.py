@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import one_of, refused, whole
+from pamrs._checks import matched, one_of, refused, whole
 from pamrs.design._evaluator import Array, Evaluator, Genetic, Objective, Progress, Search
 from pamrs.errors import missing_package
 
@@ -63,7 +63,8 @@ def search(
     Raises
     ------
     ParameterError
-        If the method is unknown, the budget too small, or the seed negative.
+        If the method is unknown, the budget too small, the seed negative, a limit not finite, or
+        the function gives a number that is none.
     MissingPackageError
         If DEAP or cma is not installed; also an ``ImportError``.
     """
@@ -73,7 +74,7 @@ def search(
         least = f"at least one population of {settings.population} is needed"
         raise refused("evaluations", evaluations, least)
     whole("seed", seed)
-    low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
+    low, high = matched(lower=lower, upper=upper)
     evaluator = Evaluator(objective, low, high, evaluations, progress)
     if method == "ga":
         try:

@@ -23,7 +23,7 @@ from pamrs._views import Panels, View, in_laboratory_units, over_time
 from pamrs._writing import write_atomically
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
-from pamrs.rig import Rig
+from pamrs.rig import Rig, check_sample_time
 from pamrs.simulation._driving import (
     Signals,
     by_signal,
@@ -658,9 +658,11 @@ def names_of(argument: str, names: Iterable[str]) -> list[str]:
 
 
 def check_run(rig: Rig, sample_time: float) -> None:
-    """Refuse what is not a rig and a sample time [s] that is not a finite number above zero."""
+    """Refuse what is not a rig, and a sample time [s] that none can have, for a public function
+    that takes quantities.
+    """
     check_kind("rig", rig, Rig, "a Rig (pamrs.rigs.shoulder(), pamrs.load_rig(path))")
-    positive("sample_time", sample_time)
+    check_sample_time(rig, sample_time, inside=3)
 
 
 def check_rows(channels: int, rows: int) -> None:
@@ -680,7 +682,8 @@ def whole_samples(name: str, value: float, sample_time: float, least: int) -> in
         if isinstance(value, (int, float, np.number)) and np.isfinite(value)
         else -1
     )
-    if count < least or abs(count * sample_time - value) > 1e-6 * sample_time:
+    near = abs(count * sample_time - value) <= 1e-6 * sample_time
+    if not (least <= count <= MOST_NUMBERS and near):
         raise ParameterError(
             f"{name} = {value} s is not allowed: a multiple of sample_time = {sample_time} s, "
             f"{least} at least, is needed"

@@ -491,7 +491,7 @@ def _repeats(slow: Recording, fast: Recording) -> bool:
         if name in fast.channels and is_set(name):
             one, other = values[:size], fast.channels[name][:size]
             both = slow.mask[name][:size] & fast.mask[name][:size]
-            if np.ptp(one[both]) > 0.0 and np.array_equal(one[both], other[both]):
+            if both.any() and np.ptp(one[both]) > 0.0 and np.array_equal(one[both], other[both]):
                 return True
     return False
 
