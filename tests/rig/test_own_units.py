@@ -13,8 +13,10 @@ import pytest
 from pamrs import cli, rigs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.next_experiment._plan import Plan, Sight
+from pamrs.errors import ParameterError
 from pamrs.experiments import library
 from pamrs.rig import Units, parse_rig
+from pamrs.simulation import core_rig
 from tests.rig.cases import refused
 
 #: A bench of somebody who writes pounds and inches.
@@ -107,6 +109,24 @@ def test_warnings_refusals_and_plans_are_in_pounds_and_inches(
     assert len(texts) > 5
     assert all(" psi" in text for text in texts)
     assert not [text for text in texts if METRIC.search(text)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("value = 0.276, ", "value = 0.05, ", "max_angle = 120 deg is not allowed: an angle that"),
+        (
+            '{ value = 0.003175, unit = "m" }',
+            '{ value = 12.5, unit = "mm" }',
+            r"thickness = 12\.5 mm is .* to 11\.43 mm \(0\.45 rest diam",
+        ),
+    ],
+)
+def test_a_refusal_of_the_core_is_in_the_unit_of_the_file(old: str, new: str, said: str) -> None:
+    text = rigs.template()
+    assert old in text
+    with pytest.raises(ParameterError, match=said):
+        core_rig(parse_rig(text.replace(old, new)))
 
 
 def test_a_plan_gives_sizes_in_the_units_of_the_file() -> None:

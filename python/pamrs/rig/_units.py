@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from pamrs.channels import read_in
 from pamrs.units import from_si, parse_unit, with_unit
+
+#: A refusal of the core, which knows SI alone, and a range in it.
+_REFUSED = re.compile(r"(?P<name>[\w.-]+) = (?P<value>\S+) (?P<why>is not allowed: .*)", re.DOTALL)
+_RANGE = re.compile(r"from (\S+) to (\S+) (\S+)")
 
 
 @dataclass(frozen=True)
@@ -85,3 +91,32 @@ class Units:
         unit = self.of(name, si)
         spread = f" ± {from_si(tol, unit, si, difference=True):.3g}" if tol else ""
         return with_unit(f"{from_si(value, unit, si):{digits}}{spread}", unit)
+
+    def retold(self, refusal: str, known: Mapping[str, str]) -> str:
+        """What the core says of a value, in the unit of the file.
+
+        Parameters
+        ----------
+        refusal : str
+            Its message, in SI.
+        known : mapping of str to str
+            SI units by the dotted names of the parameters.
+
+        Returns
+        -------
+        str
+            As it was where it is about none of these.
+        """
+        found = _REFUSED.fullmatch(refusal)
+        if found is None or found["name"] not in known:
+            return refusal
+        name, si = found["name"], known[found["name"]]
+
+        def ends(range_: re.Match[str]) -> str:
+            if range_[3] != si:
+                return range_[0]
+            first, last = (from_si(float(end), self.of(name, si), si) for end in range_.group(1, 2))
+            return with_unit(f"from {first:.4g} to {last:.4g}", self.of(name, si))
+
+        value = self.said(name, si, float(found["value"]))
+        return f"{name} = {value} {_RANGE.sub(ends, found['why'])}"

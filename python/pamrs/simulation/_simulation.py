@@ -522,9 +522,14 @@ def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
     """
     cached: Any = rig.__dict__.get("_compiled")
     if cached is None:
-        cached = _revalued(rig, like)
-        if cached is None:
-            cached = _core.Rig(rig.to_json()) if like is None else like.respecified(rig.to_json())
+        try:
+            cached = _revalued(rig, like)
+            if cached is None:
+                text = rig.to_json()
+                cached = _core.Rig(text) if like is None else like.respecified(text)
+        except ParameterError as error:
+            known = {name: own.unit for name, own in rig.parameters.items()}
+            raise ParameterError(rig.units.retold(str(error), known)) from None
         object.__setattr__(rig, "_compiled", cached)
     compiled: _core.Rig = cached
     return compiled
