@@ -11,6 +11,7 @@ import pytest
 
 from pamrs import Joint, library, rigs
 from pamrs.cli import design as cli_design
+from pamrs.cli._shared import counted
 from pamrs.rig import parse_rig
 from tests.scripts import command
 from tests.tables import rows_of
@@ -154,12 +155,11 @@ def test_a_package_that_is_broken_is_named(capsys, tmp_path, monkeypatch):
     assert "which cannot be loaded (cannot import name 'no_such_name'" in err
 
 
-def test_the_bar_is_shown_to_a_person_only(capsys, monkeypatch):
-    with cli_design._bar("runs") as progress:
-        assert progress is None
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with cli_design._bar("runs") as progress:
-        progress(1, 2)
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert "runs" in captured.err
+def test_a_short_count_is_shown_to_a_person_only(capsys, monkeypatch):
+    for person in (False, True):
+        monkeypatch.setattr("sys.stderr.isatty", lambda person=person: person)
+        with counted("runs") as done:
+            done(1, 2)
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert ("runs" in captured.err) == person

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -13,8 +11,16 @@ import typer
 
 from pamrs._checks import refused
 from pamrs._writing import check_writable, write_atomically
-from pamrs.cli._shared import Contents, document, exact, file_of, json_help, named_muscle, write
-from pamrs.cli._streams import terminal
+from pamrs.cli._shared import (
+    Contents,
+    counted,
+    document,
+    exact,
+    file_of,
+    json_help,
+    named_muscle,
+    write,
+)
 from pamrs.units import bar_and_psi
 
 if TYPE_CHECKING:
@@ -149,23 +155,23 @@ def _found(context: typer.Context, problem: JointProblem) -> _Found:
     options = {"evaluations": evaluations, "seed": seed}
     genetic = Genetic(mutation=given["mutation"])
     if given["minimise_pressure"]:
-        with _bar("pressures") as bar:
-            lowest = minimum_pressure(problem, method, genetic=genetic, **options, progress=bar)
-        with _bar("designs") as bar:
-            strict = least_pressure(problem, seed=seed, progress=bar)
+        with counted("pressures") as say:
+            lowest = minimum_pressure(problem, method, genetic=genetic, **options, progress=say)
+        with counted("designs") as say:
+            strict = least_pressure(problem, seed=seed, progress=say)
         found = _Found(lowest.design, lowest, strict)
     else:
-        with _bar("designs") as bar:
-            found = _Found(optimise(problem, method, genetic=genetic, **options, progress=bar))
+        with counted("designs") as say:
+            found = _Found(optimise(problem, method, genetic=genetic, **options, progress=say))
     problem = found.design.problem
     if given["compare"]:
         lasting = replace(genetic, tolerance=None)
-        with _bar("runs") as bar:
-            runs = compare_methods(problem, evaluations=evaluations, genetic=lasting, progress=bar)
+        with counted("runs") as say:
+            runs = compare_methods(problem, evaluations=evaluations, genetic=lasting, progress=say)
         found = replace(found, comparison=runs)
     if given["pareto"]:
-        with _bar("generations") as bar:
-            found = replace(found, front=pareto_front(problem, seed=seed, progress=bar))
+        with counted("generations") as say:
+            found = replace(found, front=pareto_front(problem, seed=seed, progress=say))
     return found
 
 
@@ -235,26 +241,6 @@ def _summary(found: _Found) -> str:
     if found.front is not None:
         text += f"\n\n{_front_table(found.front)}"
     return text
-
-
-@contextmanager
-def _bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
-    """A progress bar on standard error where a person is looking."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(file=terminal()), transient=True) as progress:
-        task = progress.add_task(what, total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
 def _strict_line(design: JointDesign | None) -> str:
