@@ -18,6 +18,8 @@ DOCS = ROOT / "docs"
 #: Folders whose pages are made by a command, or are records of what was found.
 RECORDS = ("effects", "reproduction", "proof", "decisions")
 MOST_WORDS = 1500
+MOST_LETTERS = 500  # of a paragraph
+MADE = ("benchmarks", "convergence", "recruitment")  # pages that a command writes
 PAGES = sorted(page for page in DOCS.rglob("*.md") if not page.name.startswith("_"))
 WRITTEN = [page for page in PAGES if page.relative_to(DOCS).parts[0] not in RECORDS]
 #: Pages whose programs need nothing but the package and take less than a second.
@@ -79,9 +81,29 @@ def test_every_page_is_in_the_contents() -> None:
     assert reached == {name_of(page) for page in PAGES}
 
 
+def words_of(page: Path) -> str:
+    """Text of a page without the tables that are made from the package, and without code."""
+    text = page.read_text(encoding="utf-8")
+    text = re.sub(r"^<!-- (made-\S+) -->$.*?^<!-- end of \1 -->$", "", text, flags=re.M | re.S)
+    return re.sub(r"^ *```.*?^ *```$", "", text, flags=re.M | re.S)
+
+
 @pytest.mark.parametrize("page", WRITTEN, ids=name_of)
 def test_pages_are_short(page: Path) -> None:
-    assert len(page.read_text(encoding="utf-8").split()) <= MOST_WORDS
+    assert len(words_of(page).split()) <= MOST_WORDS
+
+
+def paragraphs(page: Path) -> list[str]:
+    """Paragraphs and points of a page, each as one line; headings, tables and code are none."""
+    parts = re.split(r"\n\s*\n|\n(?=\s*(?:[-*|]|\d+\.) )", words_of(page))
+    lines = [" ".join(part.split()) for part in parts if not part.lstrip("\n").startswith("    ")]
+    return [line for line in lines if not line.startswith(("|", "#"))]
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=name_of)
+def test_paragraphs_are_short(page: Path) -> None:
+    if name_of(page) not in MADE:
+        assert [line for line in paragraphs(page) if len(line) > MOST_LETTERS] == []
 
 
 def is_public(module: ModuleType, word: str) -> bool:

@@ -281,7 +281,7 @@ def _without_models(
     terms = [term for hypothesis in ambiguity for term in hypothesis.terms]
     named = not any(hypothesis.rest for hypothesis in ambiguity)
     if terms and named and all(term.is_value for term in terms):
-        return NextExperiment(_measured(terms) + ".")
+        return NextExperiment(_measured(terms, asked.nominal) + ".")
     settled = not ambiguity and verdict != "unlisted"
     block = missing[0] if missing and not ambiguity else asked.place(terms)
     if not settled:
@@ -354,7 +354,8 @@ def _pair(
         if values:
             return PairExperiment(
                 labels,
-                f"{_measured(values)}; or, for the {spoken_name(block.name)}: {what}; {shows}.",
+                f"{_measured(values, asked.nominal)}; or, for the {spoken_name(block.name)}: "
+                f"{what}; {shows}.",
                 kind,
             )
         effect = next((term for term in differing if term.is_effect), None)
@@ -375,7 +376,7 @@ def _pair(
             f" (without {spoken(str(listed))} the model would miss the {spoken_name(channel)} by "
             f"{size:.2g} times the noise level)"
         )
-    text += f". {_measured(values)}." if values else "."
+    text += f". {_measured(values, asked.nominal)}." if values else "."
     return PairExperiment(labels, text, kind, None if missed is None else missed[1])
 
 
@@ -405,12 +406,16 @@ def _missed_without(
     return None
 
 
-def _measured(values: Sequence[Term]) -> str:
+def _measured(values: Sequence[Term], rig: Rig) -> str:
     """How values of the rig file are told from what looks like them."""
-    names = " or the ".join(spoken_name(term.id) for term in values)
+    ways, told = words("measured"), list[str]()
+    for term in values:
+        known = rig.parameters.get(term.id)
+        way = ways.get(term.id.rpartition(".")[2], ways.get(known.unit) if known else None)
+        told.append(spoken_name(term.id) + (f" ({way})" if way else ""))
     return (
-        f"Measure the {names} by itself (scale, ruler, known volume): these recordings cannot tell "
-        "which is wrong"
+        f"Measure the {' or the '.join(told)} by itself: these recordings cannot tell which is "
+        "wrong"
     )
 
 
