@@ -324,8 +324,10 @@ def whole(name: str, value: Any, least: int = 0, most: int | None = None) -> int
     return int(value)
 
 
-def rising(name: str, given: Any) -> tuple[float, float]:
-    """Two rising finite numbers.
+def rising(
+    name: str, given: Any, lower: float = -math.inf, upper: float = math.inf, unit: str = ""
+) -> tuple[float, float]:
+    """Two rising finite numbers, within bounds in a unit.
 
     Raises
     ------
@@ -336,8 +338,9 @@ def rising(name: str, given: Any) -> tuple[float, float]:
         low, high = map(_number, given)
     except (TypeError, ValueError):
         low = high = math.nan
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise refused(name, given, "two rising finite numbers are needed")
+    if not (math.isfinite(low) and math.isfinite(high) and lower <= low < high <= upper):
+        ends = with_unit(f" from {lower:g} to {upper:g}", unit) if upper < math.inf else ""
+        raise refused(name, given, f"two rising finite numbers{ends} are needed")
     return low, high
 
 

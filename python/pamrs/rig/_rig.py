@@ -200,11 +200,14 @@ class Rig(View):
     def _numbers(self) -> dict[str, str]:
         told = {"rig": self.name, "blocks": ", ".join(self.blocks)}
         for name, table in self.tables("muscle").items():
-            size = f"{1e3 * table['rest_length']:.4g} x {1e3 * table['rest_diameter']:.4g} mm"
-            told[qualified("muscle", name)] = f"{table['model']}, {size}, {table['count']} of them"
+            full = qualified("muscle", name)
+            ends = ((key, table[key]) for key in ("rest_length", "rest_diameter"))
+            size = " x ".join(self.units.said(f"{full}.{key}", "m", end) for key, end in ends)
+            told[full] = f"{table['model']}, {size}, {table['count']} of them"
         for name, table in self.tables("supply").items():
-            bar = f"{table['initial_pressure'] / 1e5:.4g} bar"
-            told[qualified("supply", name)] = f"{table['kind']}, {bar}"
+            full = qualified("supply", name)
+            begun = self.units.said(f"{full}.initial_pressure", "Pa", table["initial_pressure"])
+            told[full] = f"{table['kind']}, {begun}"
         told |= {"effects": ", ".join(full_name(e) for e in self.effects)} if self.effects else {}
         return told | {"cautions": "; ".join(self.cautions) or "none"}
 

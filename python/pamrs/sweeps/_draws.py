@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import one_of, refused, whole
+from pamrs._checks import one_of, refused, rising, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.sweeps._axes import Axes, Quantity, chosen, quantity
@@ -102,16 +102,8 @@ def ranges(
 
 
 def _between(known: Quantity, bounds: Any) -> Range:
-    try:
-        low, high = (float(end) for end in bounds)
-    except (TypeError, ValueError):
-        raise refused(f"within[{known.name!r}]", bounds, "(lowest, highest) is needed") from None
-    if not (known.lower <= low < high <= known.upper and np.isfinite(high - low)):
-        raise ParameterError(
-            f"within[{known.name!r}] = ({low:g}, {high:g}) is not allowed: the lower end first, "
-            f"from {known.lower:g} to {known.upper:g} {known.unit}"
-        )
-    return Range(known.name, known.unit, low, high)
+    ends = rising(f"within[{known.name!r}]", bounds, known.lower, known.upper, known.unit)
+    return Range(known.name, known.unit, *ends)
 
 
 def _tolerated(known: Quantity) -> Range:

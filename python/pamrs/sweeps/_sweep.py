@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from pamrs._checks import as_numbers, check_kind, misshapen, quantities, refused, whole
+from pamrs._checks import as_numbers, check_kind, finite, misshapen, quantities, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig, check_sample_time
 from pamrs.sweeps._axes import INITIAL, Axes, Grid
@@ -126,10 +126,10 @@ def sweep(
     drive = OpenLoop(
         {str(name): metric_of(name, given) for name, given in metrics.items()},
         check_sample_time(rig, sample_time, inside=2),
-        None if step is None else _number("step", step),
-        None if duration is None else _number("duration", duration),
+        None if step is None else finite("step", step),
+        None if duration is None else finite("duration", duration),
         {name: _signal(name, given) for name, given in signals.items() if given is not None},
-        {name: _number(f"initial {name}", value) for name, value in (initial or {}).items()},
+        {name: finite(f"initial {name}", value) for name, value in (initial or {}).items()},
     )
     return run_plan(
         rig,
@@ -151,13 +151,6 @@ def _signal(name: str, given: Any) -> Any:
     if signal.ndim > 1 or signal.size == 0:
         raise misshapen(name, signal.shape, each="one value for each sample, the same for all runs")
     return signal if signal.ndim else float(signal)
-
-
-def _number(name: str, given: Any) -> float:
-    try:
-        return float(given)
-    except (TypeError, ValueError):
-        raise refused(name, given, "a number is needed") from None
 
 
 def run_plan(
