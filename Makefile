@@ -44,6 +44,8 @@ ifeq ($(shell grep -m 1 '^flags' /proc/cpuinfo 2>/dev/null | tr ' ' '\n' | grep 
 export RUSTFLAGS ?= -C target-cpu=x86-64-v3
 endif
 export MPLBACKEND := Agg
+# Compiled modules are kept, whatever the shell says: tests of the command line start Python anew.
+export PYTHONDONTWRITEBYTECODE :=
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
@@ -101,7 +103,7 @@ demo: setup  ## conceal an effect, diagnose it, open the key (KIND=leak_muscle S
 # Each stage goes on where it was stopped. Exit code 3: some case could not be diagnosed, which the page says.
 prove: build  ## blinded trial from cases to prove_out/proof/trial.md, hours (SEED=7 CASES=12 JOBS=2 FOLDER=prove_out to choose)
 	$(BIN)/python -m trial write $(FOLDER) --seed $(PROVE_SEED) $(if $(CASES),--cases $(CASES)) --jobs $(JOBS)
-	$(BIN)/pamrs prove $(FOLDER) --jobs $(JOBS) || test $$? -eq 3
+	$(BIN)/python -m trial prove $(FOLDER) --jobs $(JOBS) || test $$? -eq 3
 	@mkdir -p $(PAGE)
 	$(BIN)/python -m benchmarks.baselines $(FOLDER) --jobs $(JOBS) --markdown $(PAGE)/peers.md || test $$? -eq 3
 	$(BIN)/python -m trial score --keys $(FOLDER)/keys --results $(FOLDER)/results --markdown $(PAGE)/trial.md --json $(PAGE)/scores.json --command "$(PROVE_COMMAND)"
@@ -194,7 +196,7 @@ docs: build $(VENV)/.docs  ## the site, its tutorials run, to out/site/index.htm
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html -d out/docs-pages docs out/site
 	@echo "written: out/site/index.html"
 
-reference: build  ## the tables of docs/reference: commands, keys, channels, units, settings, schemas
+reference: build  ## the tables of docs/reference: commands, keys, channels, units, settings, files
 	$(BIN)/python docs/_site/made_reference.py
 
 effects: build  ## a page of every effect of the catalogue, its fingerprint drawn by the simulator

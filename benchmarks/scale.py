@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 import pamrs
-from pamrs import sweeps
 
 #: 2 s of the shoulder at 5 ms, steps of 1 ms.
 COMMAND = np.full(401, 6.0)
@@ -66,15 +65,11 @@ def size_of(folder: Path) -> tuple[int, int]:
 def swept(store: Path, runs: int, chunk: int, executor: Executor | None = None) -> float:
     """Seconds of a sweep on one thread."""
     rig = pamrs.rigs.shoulder()
-
+    middle = np.array([rig.parameter(name).value for name in PARAMETERS])
+    drawn = middle * np.random.default_rng(0).uniform(0.9, 1.1, (runs, len(PARAMETERS)))
+    given = {"sample_time": 0.005, "valve_command": COMMAND, "store": store, "samples": drawn}
     how = {"executor": executor, "chunk": chunk, "threads": 1, "progress": False}
-
-    def work() -> None:
-        drawn = sweeps.samples(rig, PARAMETERS, runs)
-        given = {"sample_time": 0.005, "valve_command": COMMAND, "store": store}
-        pamrs.sweep(rig, drawn, METRICS, **given, **how)
-
-    return timed(work)
+    return timed(lambda: pamrs.sweep(rig, PARAMETERS, METRICS, **given, **how))
 
 
 def main() -> None:
@@ -96,11 +91,6 @@ def main() -> None:
                 f"a task of {nothing.bytes / 1e6:.3g} MB; the same call on the finished store of "
                 f"{chunks} chunks takes {again * 1e3:.3g} ms"
             )
-    rig = pamrs.rigs.shoulder()
-    drawn, skip = sweeps.samples(rig, n=2**30), 50_000_000
-    seconds = timed(lambda: drawn.rows(skip, skip + 1))
-    count = len(drawn.names)
-    print(f"passing over {skip:.0e} samples of {count} parameters: {seconds:.3g} s")
 
 
 if __name__ == "__main__":

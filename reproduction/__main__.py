@@ -9,8 +9,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from pamrs.comparison import verdicts
 from reproduction import CHAPTERS, every, store
+from reproduction.comparison import verdicts
 from reproduction.page import Section, page
 from reproduction.statement_tables import to_csv
 from reproduction.summary import summary

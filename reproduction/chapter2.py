@@ -17,12 +17,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison, judge, verdicts
+from pamrs.design.sizing import free_contraction
 from pamrs.library import entry
-from pamrs.library.evaluate import free_contraction
-from pamrs.library.published import compare_entry
 from pamrs.rig import Muscle
 from pamrs.units import parse_unit
+from reproduction.comparison import Comparison, judge, verdicts
+from reproduction.muscles.published import compare_entry
 from reproduction.stand_in import (
     COUNT,
     EXTENSION,
@@ -167,7 +167,7 @@ def _on_ends() -> list[Comparison]:
 
 def _braids() -> tuple[float, float]:
     """Braid on an end where the radius is 10 % wider and 10 % narrower than at rest [m]."""
-    from pamrs.library.evaluate import root_between
+    from reproduction.muscles.evaluate import root_between
 
     muscle = _muscle()
     rest = 0.5 * float(muscle.parameters["rest_diameter"])

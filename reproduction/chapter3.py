@@ -19,15 +19,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison
-from pamrs.design import lift
 from pamrs.library import entry
-from pamrs.library.published import compare_entry
 from pamrs.rig import Joint, Muscle
 from pamrs.simulation import Simulation
 from pamrs.units import parse_unit, to_si
 from reproduction import elbow
+from reproduction.comparison import Comparison
 from reproduction.elbow import FOOT_POUND, INCH, POUND, PSI
+from reproduction.lifting import lift
+from reproduction.muscles.published import compare_entry
 from reproduction.statement_tables import Told
 from reproduction.statements import TRIAL, Lines, Statements
 
@@ -68,18 +68,13 @@ def facts(*, search: bool = True, progress: Progress | None = None) -> list[Comp
     Parameters
     ----------
     search : bool
-        Whether the joint searches of 3.5 run too: about a minute, extra ``search``.
+        Whether the joint searches of 3.5 run too: about a minute.
     progress : callable, optional
         Called with what is done next.
 
     Returns
     -------
     list of Comparison
-
-    Raises
-    ------
-    MissingPackageError
-        If a search library is missing; names the extra to install.
     """
     tell = progress or (lambda _: None)
     parts = {
@@ -149,7 +144,7 @@ def _steeper(
 
 def headings() -> dict[str, str]:
     """What is said above each group, where that is more than its name."""
-    from pamrs.library.published import headings as muscles
+    from reproduction.muscles.published import headings as muscles
 
     return muscles()
 
@@ -218,7 +213,7 @@ def _muscles() -> list[Comparison]:
     """What the library knows of the chapter's two muscles, and six of the one against two of the
     other.
     """
-    from pamrs.library.published import compare
+    from reproduction.muscles.published import compare
     from reproduction.six_against_two import compare_design
 
     rows = [
@@ -425,7 +420,7 @@ def _triangle() -> list[Comparison]:
 
 def _rates_of_triangle(rows: Lines, static: elbow.StaticCurve, printed: elbow.StaticCurve) -> None:
     """The rate where the arm sets off, at its largest, and at the top of the pressure."""
-    from pamrs.library.evaluate import activation_pressure
+    from reproduction.muscles.evaluate import activation_pressure
 
     speed = 150.0 / 10.0  # psi/s
     rate = np.degrees(static.slope) * speed

@@ -13,11 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pamrs._views import decimate
-from pamrs.design import lift
 from pamrs.report.figures import COLOURS
 from reproduction import drawing, elbow
 from reproduction.chapter3 import say, step_by_area
 from reproduction.elbow import FOOT_POUND, PSI
+from reproduction.lifting import lift
 from reproduction.page import Picture
 
 _COLOUR: Final = {"conserving": COLOURS["after"], "printed": COLOURS["before"]}

@@ -17,15 +17,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison
 from pamrs.control import FUZZY_SETS, PID, fuzzy_rules, metrics
-from pamrs.design import lift as hold
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from reproduction import lift
 from reproduction.chapter4_statements import SERIES, on_stop, restless, say, statements
+from reproduction.comparison import Comparison
 from reproduction.elbow import HYSTERESIS
 from reproduction.lift import Lifts, Map
+from reproduction.lifting import lift as hold
 from reproduction.margins import loop_margin
 from reproduction.statement_tables import Told
 from reproduction.statements import OTHER, OWN, TRIAL, Lines

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison
+from reproduction.comparison import Comparison
 from reproduction.elbow import PSI
 from reproduction.lift import Lifts
 from reproduction.statements import Statements

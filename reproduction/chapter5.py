@@ -15,10 +15,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison
 from pamrs.rigs import shoulder
 from reproduction import chapter5_comparison, tracking
 from reproduction.chapter5_statements import listed, say
+from reproduction.comparison import Comparison
 from reproduction.margins import inner_margin, loop_margin
 from reproduction.statement_tables import Told
 from reproduction.statements import Lines

@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison
 from reproduction import tracking_runs
 from reproduction.chapter5_statements import say
+from reproduction.comparison import Comparison
 from reproduction.tracking import KINDS, SETTLED, Track
 from reproduction.tracking_runs import MIDDLE, Plan
 

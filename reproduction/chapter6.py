@@ -19,14 +19,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison
-from pamrs.design import lift
+from pamrs.design.sizing import free_contraction
 from pamrs.library import entry
-from pamrs.library.evaluate import free_contraction
-from pamrs.library.published import compare_entry
 from pamrs.rig import Joint, Muscle
 from reproduction import chapter6_loops as loops
 from reproduction import recruiting as rec
+from reproduction.comparison import Comparison
+from reproduction.lifting import lift
+from reproduction.muscles.published import compare_entry
 from reproduction.recruiting import EXTENDED, MATRIX, MUSCLES, PAYLOADS, Case, Cycles
 from reproduction.rigs import with_struts
 from reproduction.statement_tables import Told

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pamrs.design.sizing import free_contraction
 from pamrs.library import entry
-from pamrs.library.evaluate import free_contraction
 from pamrs.report.figures import COLOURS
 from reproduction import drawing
 from reproduction import recruiting as rec

@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.design import lift
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint, Rig
 from pamrs.rigs import named
 from pamrs.simulation import Simulation, simulate
 from pamrs.units import to_si
+from reproduction.lifting import lift
 from reproduction.rigs import with_struts
 
 if TYPE_CHECKING:

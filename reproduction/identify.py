@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from pamrs.errors import ParameterError
 from pamrs.library import Entry, quantity
-from pamrs.library.evaluate import KINDS
+from reproduction.muscles import identification
+from reproduction.muscles.evaluate import KINDS
 
 Array = NDArray[np.float64]
 
@@ -111,7 +112,7 @@ def derive(entry: Entry) -> Identification:
     """
     muscle = entry.muscle
     identified: dict[str, Any] = {}
-    given = entry.identification
+    given = identification(entry.name)
     if "angle" in given:
         at = {key: quantity(item) for key, item in given["angle"].items()}
         identified["braid_angle"] = KINDS["angle_for_force"](entry, at)

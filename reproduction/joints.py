@@ -11,18 +11,11 @@ from typing import Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison
-from pamrs.design import (
-    LENGTHS,
-    JointDesign,
-    JointProblem,
-    compare_methods,
-    least_pressure,
-    minimum_pressure,
-    optimise,
-)
+from pamrs.design import LENGTHS, JointDesign, JointProblem, least_pressure
 from pamrs.library import entry
 from pamrs.units import to_si
+from reproduction.comparison import Comparison
+from reproduction.joint_search import designed, minimum_pressure, objectives
 from reproduction.statements import Lines, Statements
 
 _FOOT_POUND: Final = to_si(1.0, "ft lbf", "torque")
@@ -217,8 +210,8 @@ def facts_of_search(
     second = least_pressure(problem.replace(bounds=least))
     tell(f"{case.name}: spread of the genetic algorithm")
     reachable = problem.replace(pressure=1.1 * (outer.pressure or problem.pressure))
-    values = compare_methods(reachable, methods=("ga",), seeds=range(seeds)).fitness[0]
-    best = optimise(reachable, "cma").scores.fitness[0]
+    values = objectives(reachable, "ga", range(seeds))
+    best = designed(reachable, "cma").scores.fitness[0]
     rows = say.lines(case.title)
     for title, found in (
         ("GA and bisection", outer.design if outer.met else None),
@@ -237,7 +230,7 @@ def _angle_needed(case: PublishedCase, problem: JointProblem, torque: float) -> 
     """The braid angle with which the rest torque is the wanted one, in words; empty where it is
     there already.
     """
-    from pamrs.library.evaluate import root_between
+    from reproduction.muscles.evaluate import root_between
 
     if torque >= case.torque:
         return ""

@@ -7,6 +7,7 @@ friction and inertia as in 4.4.2, and in whatever a :class:`Variant` adds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -29,7 +30,6 @@ from pamrs.control import (
 )
 from pamrs.control.metrics import combined, evaluate
 from pamrs.control.trajectories import degrees, lift_hold_return
-from pamrs.control.tuning import perturbed
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.rigs import named
@@ -49,6 +49,8 @@ LOW, HIGH = 15.0, 80.0
 PERIOD: Final = 0.005
 #: RK4 step and time between two recorded rows [s].
 _STEP, _ROW = 1e-3, 0.01
+#: Largest deviation of force, friction and inertia of the plant from the model.
+SPREAD: Final = 0.05
 #: Seed of the plant that is a little different: force -4.2 %, friction +3.6 %, inertia +4.9 %.
 _SEED: Final = 1
 
@@ -190,9 +192,8 @@ def plant(
     -------
     Rig
     """
-    rig = perturbed(
-        assumed(variant).with_parameters({"arm.payload": payload}), seed
-    ).with_parameters(variant.hidden)
+    known = assumed(variant).with_parameters({"arm.payload": payload})
+    rig = perturbed(known, seed).with_parameters(variant.hidden)
     if variant.hysteresis:
         rig = with_muscle(rig, None, **HYSTERESIS)
     if variant.regulated:
@@ -205,6 +206,36 @@ def plant(
     for name, values in variant.effects.items():
         rig = rig.with_effect(name, values)
     return rig
+
+
+def perturbed(rig: Rig, seed: int | None) -> Rig:
+    """A plant that the controller's model is not quite: muscle force, friction and arm inertia off
+    by 2.5 to 5 %, each up or down.
+
+    The force goes with the muscle's cross-section, and its volume with it; the bladder's elastic
+    force, a smaller part, keeps its modulus. The payload is known.
+
+    Parameters
+    ----------
+    rig : Rig
+        The controller's model.
+    seed : int, optional
+        Of the deviations; None for none.
+
+    Returns
+    -------
+    Rig
+    """
+    if seed is None:
+        return rig
+    rng = np.random.default_rng(seed)
+    factors = 1.0 + SPREAD * rng.choice([-1.0, 1.0], 3) * rng.uniform(0.5, 1.0, 3)
+    force, friction, inertia = factors.tolist()
+    names = {"muscle.rest_diameter": math.sqrt(force), "arm.inertia": inertia}
+    names |= {"arm.viscous": friction, "arm.coulomb": friction}
+    return rig.with_parameters(
+        {name: factor * rig.parameter(name).value for name, factor in names.items()}
+    )
 
 
 @dataclass(frozen=True, eq=False)

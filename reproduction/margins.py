@@ -22,7 +22,6 @@ import numpy as np
 
 from pamrs.control import Cascade, Controller, Reference
 from pamrs.control.linear import LinearController, LinearModel, linear_controller, linearise
-from pamrs.control.stability import spectral_radius
 from pamrs.rig import Joint, Rig
 
 #: Factor that a pressure loop of :func:`inner_gains` leaves at its fastest point.
@@ -236,6 +235,19 @@ def _factor(model: LinearModel, linear: LinearController, slope: float) -> float
     """The factor of the loop's gain at which it is at its boundary."""
 
     def radius(factor: float) -> float:
-        return spectral_radius(replace(model, b=slope * factor * model.b), linear)
+        return _radius(replace(model, b=slope * factor * model.b), linear)
 
     return _boundary(radius)
+
+
+def _radius(model: LinearModel, linear: LinearController) -> float:
+    """Largest absolute eigenvalue of a loop of one command from one sample to the next."""
+    phi, gamma = model.sampled(linear.period)
+    pick = np.array([[float(name == out) for out in model.outputs] for name in linear.inputs])
+    n, k = len(phi), len(linear.a)
+    step = np.zeros((n + k, n + k))
+    step[:n, :n] = phi + gamma @ (linear.d @ pick) @ model.c
+    step[:n, n:] = gamma @ linear.c
+    step[n:, :n] = (linear.b @ pick) @ model.c
+    step[n:, n:] = linear.a
+    return float(np.abs(np.linalg.eigvals(step)).max())

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pamrs.comparison import Comparison, verdicts
+from reproduction.comparison import Comparison, verdicts
 from reproduction.statement_tables import markdown
 from reproduction.statements import text
 

@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison, judge
 from pamrs.design.sizing import Candidate, Filling, Requirement, SizingResult, size
 from pamrs.library import entry
 from pamrs.units import to_si
+from reproduction.comparison import Comparison, judge
 
 #: Elbow joint of 3.2.4: axial length, offset and tendon length [in].
 _AXIAL, _OFFSET, _TENDON = 1.56, 0.42, 3.04

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
-from pamrs.comparison import Comparison
+from reproduction.comparison import Comparison
 
 
 class Told:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import pamrs
-from pamrs.comparison import Comparison
+from reproduction.comparison import Comparison
 from reproduction.page import Picture, Section
 
 #: Folders of the package, of its reproduction, and of the other code that chapter 6 stands beside.

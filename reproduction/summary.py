@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pamrs.comparison import KINDS, Comparison
+from reproduction.comparison import KINDS, Comparison
 from reproduction.page import Section
 from reproduction.statements import text
 
@@ -21,7 +21,7 @@ def counts(section: Section) -> dict[str, int]:
     Returns
     -------
     dict of str to int
-        By kind, in the order of :data:`pamrs.comparison.KINDS`, and ``"apart"``.
+        By kind, in the order of :data:`reproduction.comparison.KINDS`, and ``"apart"``.
     """
     counted = [row for row in section.rows if not row.apart]
     return {

@@ -32,7 +32,7 @@ from pamrs.control import (
     cascaded_pid,
     sweep,
 )
-from pamrs.control.metrics import combined, steady_error, total_curvature
+from pamrs.control.metrics import combined, total_curvature
 from pamrs.control.trajectories import Trajectory, compound, lift_hold_return
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
@@ -262,13 +262,9 @@ class Track:
     def mean(self, begin: float, end: float) -> Array:
         """Mean error [deg], shape (n,)."""
         part = self._part(begin, end)
-        return np.asarray(
-            np.degrees(
-                steady_error(
-                    self.time[part], self.wanted[part], self.angle[:, part], window=end - begin
-                )
-            )
-        )
+        time, error = self.time[part], self.wanted[part] - self.angle[:, part]
+        late = time >= time[-1] - (end - begin) * (1.0 + 1e-12)
+        return np.asarray(np.degrees(error[:, late].mean(axis=-1)))
 
     def nu(self, begin: float = 0.0, end: float = math.inf) -> Array:
         """Integral of the squared error (4.15) [deg^2 s], shape (n,)."""

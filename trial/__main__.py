@@ -1,5 +1,5 @@
-"""Command line of the trial: ``python -m trial write``, ``score``, ``pool``, ``insert``, ``make``
-and ``selfcheck``.
+"""Command line of the trial: ``python -m trial write``, ``prove``, ``score``, ``pool``, ``insert``,
+``make`` and ``selfcheck``.
 """
 
 from __future__ import annotations
@@ -19,9 +19,13 @@ from .marks import marks, plan_of
 from .plan import MANIFEST, write_plan
 from .pooled import CASES, pooled, table_of_cases
 from .pooled import page as pooled_page
+from .prove import TIMEOUT, prove
 from .report import about, checked, run_of
 from .selfcheck import selfcheck
 from .tables import markdown, scores, to_json
+
+#: Exit code when a case could not be diagnosed.
+INCOMPLETE = 3
 
 #: adds a command: its name, and what it is for as ``help``
 Add = Callable[..., argparse.ArgumentParser]
@@ -32,8 +36,9 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m trial", description="Blinded trial of the diagnosis on concealed data."
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    for add in (_add_write, _add_score, _add_pool, _add_insert, _add_make, _add_selfcheck):
+    for add in (_add_write, _add_prove, _add_score, _add_pool, _add_insert, _add_make):
         add(commands.add_parser)
+    _add_selfcheck(commands.add_parser)
     return parser
 
 
@@ -69,6 +74,54 @@ def _write(args: argparse.Namespace) -> None:
     chosen = specs(args.seed, args.cases, args.duration, args.plan)
     manifest = write_plan(args.folder, chosen, jobs=args.jobs, progress=told)
     print(f"sha256 of the manifest: {hashlib.sha256(manifest.read_bytes()).hexdigest()}")
+
+
+def _add_prove(add: Add) -> None:
+    run = add(
+        "prove",
+        help="diagnose every case, each in a process that is given that case alone; answer keys "
+        "are not opened; goes on where it was stopped; exit code 3: some case has no result",
+    )
+    run.add_argument(
+        "folder", type=Path, help="cases/NAME/case.toml or NAME/case.toml, and maybe manifest.json"
+    )
+    run.add_argument(
+        "--results", type=Path, help="gets NAME/out.json and run.json (default: FOLDER/results)"
+    )
+    run.add_argument("--jobs", type=int, default=1, help="cases at a time (default 1)")
+    run.add_argument("--limit", type=int, help="only the first so many cases")
+    run.add_argument("--fresh", action="store_true", help="diagnose again what has a result")
+    run.add_argument(
+        "--allow-outside", action="store_true", help="files may lie outside the folder of a case"
+    )
+    run.add_argument(
+        "--timeout",
+        type=float,
+        default=TIMEOUT,
+        help=f"seconds after which a case is given up (default {TIMEOUT:g})",
+    )
+    run.set_defaults(run=_prove)
+
+
+def _prove(args: argparse.Namespace) -> int:
+    def told(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    proof = prove(
+        args.folder,
+        results=args.results,
+        jobs=args.jobs,
+        limit=args.limit,
+        fresh=args.fresh,
+        timeout=args.timeout,
+        say=told,
+        allow_outside=args.allow_outside,
+    )
+    print(proof.table())
+    for name, error in proof.failed.items():
+        print(f"{name}: {error}")
+    told(f"written: {proof.results}")
+    return INCOMPLETE if proof.failed else 0
 
 
 def _add_score(add: Add) -> None:
@@ -137,9 +190,7 @@ def _add_insert(add: Add) -> None:
         "or the weighing failed",
     )
     again.add_argument("folder", type=Path, help="the trial: cases/ and keys/")
-    again.add_argument(
-        "--results", type=Path, help="results of `pamrs prove` (default: FOLDER/results)"
-    )
+    again.add_argument("--results", type=Path, help="results of `prove` (default: FOLDER/results)")
     again.add_argument("--markdown", type=Path, help="write the table here")
     again.set_defaults(run=_insert)
 
@@ -221,11 +272,10 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     args = _parser().parse_args(argv)
     try:
-        args.run(args)
+        return args.run(args) or 0
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    return 0
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ said.
 A diagnosis that names something else, or nothing, has either not found the true hypothesis (the
 search failed), or found it and weighed it too little, or has no equation that is like the truth.
 ``pamrs diagnose --consider`` fits the true names from every start and judges them with what the
-search found by itself; like `pamrs prove` it runs in a process of its own.
+search found by itself; like `python -m trial prove` it runs in a process of its own.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ def all_inserted(
     folder : path
         The trial: ``cases``, ``keys``.
     results : path
-        Results of ``pamrs prove``.
+        Results of ``python -m trial prove``.
     progress : callable, optional
         Called with a line after each case.
     """

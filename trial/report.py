@@ -50,13 +50,13 @@ def checked(folder: Path) -> tuple[str, int]:
 
 
 def run_of(results: Path, digest: str) -> dict[str, Any]:
-    """What ``pamrs prove`` says of its run; it must be of this manifest."""
+    """The record that ``python -m trial prove`` keeps; it must be of this manifest."""
     file = results / "run.json"
     if not file.is_file():
         return {}
     told: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     if told.get("manifest_sha256") not in (None, digest):
-        raise ValueError(f"{file}: of another manifest; run `pamrs prove` again")
+        raise ValueError(f"{file}: of another manifest; run `python -m trial prove` again")
     return told
 
 
@@ -88,7 +88,7 @@ def about(folder: Path, digest: str, count: int, run: dict[str, Any], command: s
         lines.append(f"- {spent / 3600.0:.1f} h of processor time for the diagnoses")
         if len(codes) > 1:
             lines.append(
-                "- **The results were made by different code: run `pamrs prove --fresh` before "
-                "they are quoted.**"
+                "- **The results were made by different code: run `python -m trial prove --fresh` "
+                "before they are quoted.**"
             )
     return [*lines, f"\nMade by\n\n```\n{command}\n```\n"]

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from benchmarks.ablation.kept import keep_cases
 from benchmarks.ablation.without import PARTS, parts_table, weights_table
-from pamrs.diagnosis.prove import cases_of
 from pamrs.errors import PamrsError
 from trial.concealed import write
+from trial.prove import cases_of
 
 
 def main(words: list[str] | None = None) -> int:

@@ -2,7 +2,7 @@
 trial, resumable.
 
 Writes ``DIR/baselines/NAME.json`` for each case. The keys are opened after the last case only,
-where there are some, for the table of the gap closed by every method, that of ``pamrs prove``
+where there are some, for the table of the gap closed by every method, that of pamrs
 beside them.
 """
 
@@ -13,10 +13,10 @@ import os
 import sys
 from pathlib import Path
 
-from pamrs.diagnosis.prove import cases_of
 from pamrs.errors import PamrsError
 from trial.peers import beside, peers_page
 from trial.plan import MANIFEST
+from trial.prove import cases_of
 from trial.report import checked
 
 
@@ -31,7 +31,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument(
         "--results",
         type=Path,
-        help="results of `pamrs prove`; gets baselines/ (default: FOLDER/results)",
+        help="results of `python -m trial prove`; gets baselines/ (default: FOLDER/results)",
     )
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     parser.add_argument("--limit", type=int, help="only the first so many cases")

@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.baselines.sheet import errors, gap_closed, sheet
 from pamrs._writing import write_atomically
-from pamrs.diagnosis.prove import case_digest
+from trial.prove import case_digest
 
 SCHEMA = "pamrs.baselines/1"
 METHODS = ("refit", "free", "sindy", "gp")

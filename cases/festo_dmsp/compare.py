@@ -25,7 +25,6 @@ from pamrs.fit import (
     fit_muscle,
     load_measured_muscle,
 )
-from pamrs.fit.report import render_png
 
 HERE = Path(__file__).parent
 PUBLISHED = {"DMSP-20-300": 4.4, "DMSP-10-250": 2.35}
@@ -177,8 +176,7 @@ def one_map(name: str, out: Path) -> None:
     )
     print(other_choices(measured, published, settings))
     fit = fit_muscle(data, measured.muscle, model="robinson", order=4, levels=chosen, **settings)
-    picture = out / f"{name}.png"
-    picture.write_bytes(render_png(fit))
+    picture = fit.figure(out / f"{name}.png")
     print(f"written: {picture}", file=sys.stderr)
 
 

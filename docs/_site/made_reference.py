@@ -1,10 +1,11 @@
 """Tables of the reference, made from the package: commands, keys of rig files, channels, units,
-settings, schemas. Each stands in a page between two marks, and the page around it has the words;
+settings, files. Each stands in a page between two marks, and the page around it has the words;
 ``make reference`` writes them anew.
 """
 
 import dataclasses
-import json
+import inspect
+import itertools
 import math
 import re
 from pathlib import Path
@@ -127,54 +128,46 @@ def settings():
     yield from rows(["setting", "default", "unit", "what", "origin"], lines)
 
 
-def _schemas():
-    from pamrs.diagnosis.result import schema
-    from pamrs.recordings import case_schema
-    from pamrs.rig.json_schema import rig_schema
+def case_keys():
+    """Every key of ``case.toml``, by its table."""
+    from pamrs.recordings import CASE_KEYS
 
-    return {"rig": rig_schema, "case": case_schema, "result": schema}
-
-
-def _kind(entry, document):
-    while "$ref" in entry:
-        entry = document["$defs"][entry["$ref"].rpartition("/")[2]] | {
-            key: value for key, value in entry.items() if key != "$ref"
-        }
-    ways = [_kind(way, document)[0] for way in entry.get("anyOf", entry.get("oneOf", ()))]
-    if ways:
-        return " or ".join(dict.fromkeys(filter(None, ways))), entry
-    if "enum" in entry:
-        return ", ".join(f"`{word}`" for word in entry["enum"]), entry
-    if "const" in entry:
-        return f"`{entry['const']}`", entry
-    kind = entry.get("type", "")
-    return " or ".join(kind) if isinstance(kind, list) else kind, entry
+    for name, rules in CASE_KEYS.items():
+        yield f"### {f'`{name}`' if name else 'The whole file'}\n"
+        lines = [(f"`{key}`", rule.needed, rule.about) for key, rule in rules.items()]
+        yield from rows(["key", "allowed", "what"], lines)
 
 
-def schema_keys(which):
-    """The keys of a file by its JSON schema, and of the tables inside it."""
-    document = _schemas()[which]()
-    seen = []
+def described(cls):
+    """Name and text of each attribute that a class documents."""
+    section = (inspect.getdoc(cls) or "").partition("Attributes\n----------\n")[2]
+    for names, text in re.findall(r"^(\w[\w, ]*) : .*\n((?:    .*(?:\n|$))+)", section, re.M):
+        yield from ((name, text) for name in names.split(", "))
 
-    def table_of(name, entry):
-        lines, inner = [], []
-        needed = entry.get("required", ())
-        for key, value in entry.get("properties", {}).items():
-            kind, whole = _kind(value, document)
-            item = _kind(whole["items"], document)[1] if "items" in whole else whole
-            told = [one for one in item.get("properties", {}).values() if "description" in one]
-            if told and item["properties"] not in seen:
-                seen.append(item["properties"])
-                inner.append((f"{name}{key}", item))
-            mark = "needed" if key in needed else ""
-            lines.append((f"`{key}`", kind, mark, value.get("description", "")))
-        yield from rows(["key", "kind", "", "what"], lines)
-        for path, item in inner:
-            yield f"### `{path}`\n"
-            yield from table_of(f"{path}.", item)
+
+def result_keys():
+    """Every key of ``result.json``, and of the tables inside it."""
+    from pamrs import Diagnosis, findings
+
+    def table_of(cls, seen):
+        texts = {name: text for own in cls.__mro__ for name, text in described(own)}
+        written = [field for field in dataclasses.fields(cls) if field.metadata.get("json", True)]
+        lines = []
+        for text, fields in itertools.groupby(written, key=lambda field: texts[field.name]):
+            own = list(fields)
+            keys = ", ".join(f"`{field.metadata.get('key', field.name)}`" for field in own)
+            kinds = dict.fromkeys(field.type.replace("None", "null") for field in own)
+            lines.append((keys, ", ".join(kinds), text))
+        yield from rows(["key", "kind", "what"], lines)
+        for name in re.findall(r"[A-Z]\w+", " ".join(field.type for field in written)):
+            if hasattr(findings, name) and name not in seen:
+                seen.add(name)
+                yield f"### `{name}`\n"
+                yield from table_of(getattr(findings, name), seen)
 
     yield "### The whole file\n"
-    yield from table_of("", document)
+    yield "`schema` and `version`, the pamrs that wrote it, and:\n"
+    yield from table_of(Diagnosis, set())
 
 
 MADE = {
@@ -183,8 +176,8 @@ MADE = {
     "made-channels": channels,
     "made-units": units,
     "made-settings": settings,
-    "made-case-keys": lambda: schema_keys("case"),
-    "made-result-keys": lambda: schema_keys("result"),
+    "made-case-keys": case_keys,
+    "made-result-keys": result_keys,
 }
 
 
@@ -201,16 +194,12 @@ def made_pages():
         yield page, text
 
 
-def write_schemas(app, error):
-    """The JSON schemas as files, which a page offers; and a check that no page needs a server."""
+def check_servers(app, error):
+    """Ask that no page needs a server."""
     from sphinx.errors import ExtensionError
 
     if error is not None or app.builder.format != "html":
         return
-    folder = Path(app.outdir) / "schema"
-    folder.mkdir(exist_ok=True)
-    for name, made in _schemas().items():
-        (folder / f"{name}.schema.json").write_text(json.dumps(made(), ensure_ascii=False))
     for page in Path(app.outdir).rglob("*.html"):
         asked = re.findall(
             r"""<(?:script|img|link|iframe)[^>]+(?:src|href)="https?:[^"]*""",
@@ -222,7 +211,7 @@ def write_schemas(app, error):
 
 def setup(app):
     """Called by Sphinx."""
-    app.connect("build-finished", write_schemas)
+    app.connect("build-finished", check_servers)
     return {"parallel_read_safe": True}
 
 

@@ -23,12 +23,13 @@ if TYPE_CHECKING:
         fit,
         library,
         recordings,
+        report,
         rigs,
         simulation,
         sweeps,
         units,
     )
-    from pamrs.design import Lift, lift, sizing
+    from pamrs.design import sizing
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
     from pamrs.diagnosis.result import Diagnosis, load_result
@@ -68,7 +69,6 @@ __all__ = [
     "FitError",
     "Issue",
     "Joint",
-    "Lift",
     "Muscle",
     "PamrsError",
     "Parameter",
@@ -92,13 +92,13 @@ __all__ = [
     "experiments",
     "fit",
     "library",
-    "lift",
     "load_case",
     "load_recording",
     "load_result",
     "load_rig",
     "plan_diagnosis",
     "recordings",
+    "report",
     "rigs",
     "simulate",
     "simulate_batch",
@@ -110,7 +110,7 @@ __all__ = [
 ]
 
 _NAMES: Final = {
-    "design": ("Lift", "lift", "sizing"),
+    "design": ("sizing",),
     "diagnosis": ("diagnose",),
     "diagnosis.next_experiment": ("Plan", "plan_diagnosis"),
     "diagnosis.result": ("Diagnosis", "load_result"),

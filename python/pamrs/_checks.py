@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
-_LEAST_PRESSURE = 50.0  # [Pa] below which no muscle notices a pressure
+_UNNOTICED_PRESSURE = 50.0  # [Pa] below which no muscle notices a pressure
 
 
 def as_said(value: object) -> str:
@@ -492,7 +492,7 @@ def doubt_pascals(name: str, pressure: ArrayLike, *, inside: int = 1) -> None:
     import numpy as np
 
     largest = float(np.max(np.abs(pressure), initial=0.0))
-    if 0.0 < largest < _LEAST_PRESSURE:
+    if 0.0 < largest < _UNNOTICED_PRESSURE:
         said = f"{name} never exceeds {largest:.4g} Pa (gauge): pascals are wanted, 1 bar is 1e5"
         doubt(said, inside=inside + 1)
 

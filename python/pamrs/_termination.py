@@ -1,6 +1,4 @@
-"""Signals that end a program, as exceptions: a live loop must write its safe command first, a trial
-end its workers.
-"""
+"""Signals that end a program, as exceptions: a live loop must write its safe command first."""
 
 from __future__ import annotations
 

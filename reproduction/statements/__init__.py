@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from pamrs.comparison import Comparison, judge
+from reproduction.comparison import Comparison, judge
 
 __all__ = ["OTHER", "OWN", "TRIAL", "Lines", "Statements", "symbols", "text"]
 
@@ -93,7 +93,7 @@ class Statements:
         self._short: list[str] = table["short"]
 
     def entry(self, key: str, *said: Any, **more: Any) -> dict[str, Any]:
-        """A statement without our number, as arguments of :func:`pamrs.comparison.judge`.
+        """A statement without our number, as arguments of :func:`reproduction.comparison.judge`.
 
         Parameters
         ----------

@@ -10,6 +10,7 @@ import pytest
 import pamrs
 from pamrs import cli
 from pamrs.channels import unit_of
+from pamrs.report.motion import write_animation
 from tests.scripts import command as run
 from tests.tables import rows_of
 
@@ -136,7 +137,7 @@ def test_a_chamber_has_no_motion(tmp_path):
     with pytest.raises(
         pamrs.ParameterError, match="'sealed_chamber' has no arm and no load to draw"
     ):
-        still.animate(tmp_path / "x.gif")
+        write_animation(still, tmp_path / "x.gif")
 
 
 def test_an_interrupt_is_said_and_has_its_own_code(

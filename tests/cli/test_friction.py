@@ -81,10 +81,8 @@ def test_the_coefficients_come_back_with_the_loops(capsys, table):
 
 
 def test_it_prints_and_writes_what_the_function_gives(capsys, table, tmp_path):
-    result, picture = tmp_path / "out.json", tmp_path / "out.png"
-    code, out, err = run(
-        capsys, table, *OPTIONS, "--floor", 0.0, "--json", result, "--png", picture
-    )
+    result = tmp_path / "out.json"
+    code, out, err = run(capsys, table, *OPTIONS, "--floor", 0.0, "--json", result)
     assert code == 0
     fit = fit_friction(load_force_map(table, rest_length=REST), floor=0.0)
     assert out == f"loops: {fit.fit_report()}\n"
@@ -97,11 +95,8 @@ def test_it_prints_and_writes_what_the_function_gives(capsys, table, tmp_path):
     ]
     assert document["fit"]["levels"][0]["rows"] == 80
     assert f"pamrs fit friction {table} --rest-length '276 mm' --floor 0.0" in document["command"]
-    head = picture.read_bytes()[:24]
-    assert head[:8] == b"\x89PNG\r\n\x1a\n"
-    assert (int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")) == (1600, 800)
-    assert err.count("written: ") == 2
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.json", "out.png"]
+    assert err.count("written: ") == 1
+    assert list(tmp_path.iterdir()) == [result]
 
 
 def test_the_muscle_may_be_named_or_given_in_full(capsys, table):
@@ -148,9 +143,7 @@ def test_a_table_outside_a_description_needs_to_be_allowed(capsys, table, tmp_pa
     rows_of(__file__, "wrong_input_is_one_line_and_writes_nothing"),
 )
 def test_wrong_input_is_one_line_and_writes_nothing(capsys, table, tmp_path, words, parts):
-    code, out, err = run(
-        capsys, table, *words, "--json", tmp_path / "x.json", "--png", tmp_path / "x.png"
-    )
+    code, out, err = run(capsys, table, *words, "--json", tmp_path / "x.json")
     line = err.splitlines()[-1]
     assert (code, out) == (2, "")
     assert line.startswith("pamrs: error: ")
@@ -164,6 +157,6 @@ def test_missing_files_and_folders_are_named(capsys, table):
     code, _, err = run(capsys, "no_such.csv", *OPTIONS)
     assert code == 2
     assert "no_such.csv: cannot be read" in err
-    code, _, err = run(capsys, table, *OPTIONS, "--png", "no_folder/x.png")
+    code, _, err = run(capsys, table, *OPTIONS, "--json", "no_folder/x.json")
     assert code == 2
     assert "folder no_folder does not exist" in err

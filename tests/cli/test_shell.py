@@ -17,7 +17,7 @@ from pamrs.effects import CATALOGUE
 from tests.cli.test_terminal import Terminal
 from tests.scripts import command
 
-LIFT = ["lift", "elbow", "--pressure", "8 bar"]
+SIZE = ["size", "--point", "30 mm:7 kN"]
 
 
 def leaves(command, name="pamrs"):
@@ -44,23 +44,23 @@ def test_every_command_can_be_quiet_and_says_what_its_options_are(name):
 
 def test_json_goes_to_standard_output_alone(capsys, tmp_path):
     file = tmp_path / "a.json"
-    _, text, err = command(capsys, *LIFT, "--json", file)
+    _, text, err = command(capsys, *SIZE, "--json", file)
     assert f"written: {file}" in err
-    code, out, err = command(capsys, *LIFT, "--json", "-")
+    code, out, err = command(capsys, *SIZE, "--json", "-")
     assert json.loads(out) == json.loads(file.read_text(encoding="utf-8"))
     assert (code, err) == (0, text)
-    assert command(capsys, *LIFT, "--json", "-", "--quiet") == (0, out, "")
+    assert command(capsys, *SIZE, "--json", "-", "--quiet") == (0, out, "")
 
 
 def test_quiet_leaves_out_notes_and_keeps_errors(capsys, tmp_path):
-    picture = tmp_path / "lift.png"
-    code, out, err = command(capsys, *LIFT, "--png", picture, "-q")
+    file = tmp_path / "size.json"
+    code, out, err = command(capsys, *SIZE, "--json", file, "-q")
     assert (code, err) == (0, "")
     assert "elbow" in out
-    assert picture.exists()
-    code, _, err = command(capsys, "lift", "no_such_rig", "-q")
+    assert file.exists()
+    code, _, err = command(capsys, *SIZE, "no_such_muscle", "-q")
     assert code == 2
-    assert "no_such_rig" in err
+    assert "no_such_muscle" in err
 
 
 @pytest.mark.parametrize(
@@ -136,6 +136,6 @@ def test_commands_options_and_names_are_completed():
     assert completions("pamrs", "dia") == ["diagnose"]
     assert completions("pamrs", "diagnose", "--pressure") == ["--pressure-noise"]
     assert completions("pamrs", "effects", "leak_") == [i for i in CATALOGUE if i[:5] == "leak_"]
-    assert completions("pamrs", "library", "pam_") == [n for n in library.names() if "pam_" in n]
+    assert completions("pamrs", "size", "pam_") == [n for n in library.names() if "pam_" in n]
     offered = completions("pamrs", "rig", "new", "a.toml", "--like", "t")
     assert offered == [name for name in rigs.names() if name.startswith("t")]

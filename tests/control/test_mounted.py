@@ -17,7 +17,6 @@ from pamrs.control import (
     closed_loop,
 )
 from pamrs.control.trajectories import cosine_cycles, degrees
-from pamrs.design import lift
 from pamrs.errors import ParameterError
 from tests.control.helpers import reference_arm
 from tests.reference.plant import Arm
@@ -85,20 +84,6 @@ def test_every_law_follows_as_without_and_feedforward_needs_the_terms(kind):
     assert found < 1.5 * error(PLAIN, plain, kind, **options) + 0.1
     if kind in ("feedforward", "sliding"):
         assert found < 0.35 * error(MOUNTED, plain, kind, **options)
-
-
-def test_what_is_lifted_counts_them():
-    """By the equilibrium of the joint at the angle where it is decided."""
-    result, plain = lift(MOUNTED, pressure=8e5), lift(PLAIN, pressure=8e5)
-    arm = MOUNTED.model["arm"]
-    link = result.angle + arm["base_angle"]
-    expected = arm["gravity"] * (
-        arm["first_moment"] * np.sin(link + arm["centre_angle"])
-        + arm["payload"] * arm["length"] * np.sin(link)
-    ) + SPRING[0] * (result.angle - SPRING[1])
-    np.testing.assert_allclose(result.gravity, expected, rtol=0.0, atol=1e-9)
-    np.testing.assert_allclose(result.torque, plain.torque)
-    assert result.payload_limit != plain.payload_limit
 
 
 def test_recruitment_for_a_reach_refuses_them_by_name():

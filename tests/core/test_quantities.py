@@ -19,7 +19,6 @@ from pamrs.fit import ForceMap
 from pamrs.units import same_dimension
 
 U = pint.UnitRegistry()
-ELBOW = pamrs.rigs.named("elbow")
 SHOULDER = pamrs.rigs.shoulder()
 MUSCLE = SHOULDER.muscle
 assert MUSCLE is not None
@@ -58,11 +57,6 @@ CASES: dict[str, tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = 
         lambda length: MUSCLE.replace(rest_length=length).force(4e5, 0.1),
         (150 * U.mm,),
         (0.15,),
-    ),
-    "lift": (
-        lambda p, to: pamrs.lift(ELBOW, pressure=p, to=to).payload_limit,
-        (8.3 * U.bar, 60 * U.deg),
-        (8.3e5, np.radians(60.0)),
     ),
     "parameters": (
         lambda mass: SHOULDER.with_parameters({"arm.payload": mass}).parameter("arm.payload").value,
@@ -140,7 +134,6 @@ def test_a_quantity_is_what_it_is_in_si(name: str) -> None:
         (lambda: MUSCLE.force(4 * U.m, 0.1), "pressure = .* a quantity in Pa"),
         (lambda: MUSCLE.force(4e5, 2 * U.cm), "contraction = .* a quantity in 1"),
         (lambda: JOINT.shortening(3 * U.m), "angle = .* a quantity in rad"),
-        (lambda: pamrs.lift(ELBOW, pressure=3 * U.kg), "pressure = .* a quantity in Pa"),
         (
             lambda: pamrs.simulate(
                 SHOULDER, 5.0, sample_time=5e-3, duration=1, initial={"joint_angle": 1 * U.m}
@@ -150,7 +143,12 @@ def test_a_quantity_is_what_it_is_in_si(name: str) -> None:
         (lambda: SHOULDER.with_parameters({"arm.payload": 3 * U.m}), "arm.payload = .* in kg"),
         (lambda: pamrs.simulate(SHOULDER, 5.0, sample_time=3 * U.m, duration=1), "sample_time = "),
         (
-            lambda: pamrs.sweeps.Grid({"arm.payload": U.Quantity([1.0, 2.0], "kg")}),
+            lambda: pamrs.sweep(
+                SHOULDER,
+                {"arm.payload": U.Quantity([1.0, 2.0], "kg")},
+                {"end": ("final", "joint_angle")},
+                sample_time=5e-3,
+            ),
             "arm.payload = .* plain numbers are needed here, in SI units",
         ),
         (

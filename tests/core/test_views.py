@@ -74,7 +74,6 @@ MAKERS = {
     "gain map": _gains,
     "muscle fit": lambda: pamrs.fit.fit_muscle(_map(), RIG.muscle),
     "map fit": lambda: pamrs.fit.fit_map(_map()),
-    "lift": lambda: pamrs.lift(pamrs.rigs.named("elbow"), pressure=8e5),
     "diagnosis": synthetic.diagnosis,
 }
 SAID = {
@@ -90,7 +89,6 @@ SAID = {
     "gain map": "best with 0.5 kg",
     "muscle fit": "of the largest force",
     "map fit": "3 pressures",
-    "lift": "8 bar",
     "diagnosis": "heat transfer",
 }
 

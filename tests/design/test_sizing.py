@@ -10,7 +10,14 @@ import pytest
 import pamrs.library as library
 from pamrs import Muscle
 from pamrs.design import Filling
-from pamrs.design.sizing import Candidate, Requirement, SizingResult, packed_diameter, size
+from pamrs.design.sizing import (
+    Candidate,
+    Requirement,
+    SizingResult,
+    free_contraction,
+    packed_diameter,
+    size,
+)
 from pamrs.errors import ParameterError
 from tests.reference.gas import orifice_flow
 from tests.simulation.refusals import refused
@@ -212,3 +219,17 @@ def test_a_muscle_whose_geometry_has_no_solution_is_infeasible():
     result = size([Candidate("wide", wide, 5e5), "elbow_0625in"], Requirement([(0.0, 1e3)]))
     assert "at which the geometry has a solution" in result.infeasible["wide"]
     assert [row["name"] for row in result.rows] == ["elbow_0625in"]
+
+
+@pytest.mark.parametrize("pressure", [1e5, 4e5, 8e5])
+def test_free_contraction_is_a_zero_of_the_force(pressure):
+    for name in library.names():
+        muscle = library.entry(name).muscle
+        e = free_contraction(muscle, pressure)
+        if e < muscle.contraction_limits[1]:
+            assert abs(float(muscle.force(pressure, e))) < 1e-6 * float(muscle.force(pressure, 0.0))
+            assert np.all(muscle.force(pressure, np.linspace(0.0, 0.999 * e, 50)) > 0.0)
+
+
+def test_a_free_contraction_wants_a_pressure():
+    refused(("pressure = -1", lambda: free_contraction(library.pam_a_1in(), -1.0)))

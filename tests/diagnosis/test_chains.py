@@ -482,6 +482,6 @@ def test_the_place_of_a_leak_is_asked_of_the_muscle_that_may_have_it() -> None:
     pytest.importorskip("jinja2")
     from pamrs.report import render_html
 
-    page = render_html(synthetic.diagnosis(next_experiment=found))
+    page = render_html(synthetic.diagnosis(next_experiment=found, traces=[]))
     held = found.excitation["held_bar"]["extensor"]
     assert f"extensor: {held:.3g}" in page

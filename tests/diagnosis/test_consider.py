@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import jsonschema
 import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis.result import schema
 from tests.diagnosis import again
+from tests.diagnosis.kept import kept
 from tests.tables import rows_of
 
 RIG = pamrs.rigs.shoulder()
@@ -53,8 +52,7 @@ def test_what_cannot_be_fitted_together_is_said() -> None:
 
 
 def test_it_is_told_in_text_and_json(asked: pamrs.Diagnosis) -> None:
-    data = json.loads(asked.to_json())
-    jsonschema.validate(data, schema())
+    data = kept(asked)
     assert [entry["names"] for entry in data["considered"]] == [
         list(own.names) for own in asked.considered
     ]

@@ -105,8 +105,11 @@ COPIES: dict[str, Callable[[Recording], Recording]] = {
 """Copies, as a person makes them."""
 
 
+SOME_KINDS = [*KINDS[:2], *(pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS[2:])]
+
+
 @pytest.mark.parametrize("bits", [pytest.param(0.0, marks=pytest.mark.slow), 2.0])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SOME_KINDS)
 @pytest.mark.parametrize("how", COPIES)
 def test_copies_are_found_however_they_were_made(how: str, kind: str, bits: float) -> None:
     one = run(kind, bits=bits)

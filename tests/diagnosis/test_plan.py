@@ -12,7 +12,7 @@ import pamrs
 from pamrs.cli import main
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
-from pamrs.diagnosis.next_experiment._differences import _KNOWN_SHARE, _free
+from pamrs.diagnosis.next_experiment._differences import _UNSTATED_STD_SHARE, _free
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.experiments import commands_for, library, pressure_range
 from pamrs.simulation import core_rig
@@ -49,7 +49,7 @@ def test_each_of_two_leaks_keeps_its_own_uncertainty() -> None:
     two = one.with_effect("leak_muscle", {"conductance": 6e-11}, at="extensor")
     free = _free(problem, two)
     assert free["leak_muscle.flexor.conductance"] == pytest.approx(1e-11)
-    assert free["leak_muscle.extensor.conductance"] == pytest.approx(_KNOWN_SHARE * 6e-11)
+    assert free["leak_muscle.extensor.conductance"] == pytest.approx(_UNSTATED_STD_SHARE * 6e-11)
 
 
 def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str], tmp_path) -> None:

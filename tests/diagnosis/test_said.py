@@ -4,11 +4,9 @@ rig from its commands alone, names that are not determined or spoil a channel.
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -20,12 +18,12 @@ from pamrs.diagnosis.model import _conclude, _free_run
 from pamrs.diagnosis.model._free_run import _OFF_NOISES
 from pamrs.diagnosis.next_experiment._asked import _telling, next_to_record
 from pamrs.diagnosis.prepare import unjudged_blocks
-from pamrs.diagnosis.result import schema
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
 from pamrs.experiments import experiments_of
 from pamrs.findings import BlockVerdict, BudgetTerm, FreeRun, FreeRunError
 from pamrs.report import text as words
 from tests.diagnosis.asked import SETTINGS, blocks_of, diagnosed, problem_of
+from tests.diagnosis.kept import kept
 from tests.diagnosis.terms import by_text, of_texts, terms
 from tests.diagnosis.test_assemble import NAMES, recorded
 from tests.report.test_words import group, seen, stages
@@ -51,8 +49,7 @@ def test_blocks_that_were_not_judged_are_said_everywhere() -> None:
     assert [b.blocks for b in found.judged] == [["arm"]]
     assert told["chamber"].covers == "valve, line and chamber"
     assert told["chamber"].reason == "valve_command is not in every recording"
-    content = json.loads(found.to_json())
-    jsonschema.validate(content, schema())
+    content = kept(found)
     assert [b["verdict"] for b in content["blocks"][1:]] == ["not_judged", "not_judged"]
     for text in (found.headline, found.text, found.summary()):
         flat = " ".join(text.split())

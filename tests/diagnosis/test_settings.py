@@ -58,6 +58,15 @@ def test_every_number_of_a_module_has_its_reason() -> None:
     assert len(found) > 50
 
 
+def test_a_name_of_a_number_has_one_value() -> None:
+    values: dict[str, set[str]] = {}
+    for path in sorted(DIAGNOSIS.rglob("*.py")):
+        for name, own in numbers(ast.parse(path.read_text("utf-8"))).items():
+            values.setdefault(name, set()).add(ast.unparse(own.value))  # type: ignore[attr-defined]
+    assert len(values) > 200
+    assert not {name: found for name, found in values.items() if len(found) > 1}
+
+
 def test_no_function_reads_a_default() -> None:
     """Whoever needs settings is given them; only what a user calls makes the published ones."""
     asked = ("next_experiment/_choice.py", "next_experiment/_planning.py")

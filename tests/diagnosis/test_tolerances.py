@@ -9,12 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import pamrs
 from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Problem, fit, free_baseline, residuals
+from pamrs.diagnosis.fit._tolerances import in_tolerances, moved_slope, moved_value
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import Prepared, begun_alike, predicted, residual
+from pamrs.rig import Parameter
 from pamrs.simulation import core_rig
 from tests.diagnosis.asked import problem_of
 from tests.diagnosis.healthy import healthy_case
@@ -91,3 +95,25 @@ def test_a_joint_on_its_stop_begins_at_rest_whatever_its_first_samples_say() -> 
     assert first == (True, 0.0)
     assert not second[0]
     assert abs(second[1]) < math.radians(1.0)
+
+
+@given(
+    value=st.floats(1e-3, 1e3),
+    share=st.floats(0.01, 2.0),
+    far=st.floats(-8.0, 8.0),
+    zero=st.booleans(),
+)
+def test_a_distance_in_tolerances_is_that_of_its_value(
+    value: float, share: float, far: float, zero: bool
+) -> None:
+    """Below its value a positive quantity moves by factors; what may be negative moves straight."""
+    known = Parameter("a.b", value, "1", share * value, -math.inf if zero else 0.0, math.inf)
+    moved = moved_value(known, far)
+    straight = value + far * known.tol
+    assert moved == pytest.approx(straight if zero or far > 0.0 else value * math.exp(far * share))
+    least = -math.inf if zero else -math.log(1e3) / share
+    assert in_tolerances(known, moved) == pytest.approx(max(far, least), abs=1e-6)
+    near = moved_value(known, far + 1e-6), moved_value(known, far - 1e-6)
+    if abs(far) > 1e-5:
+        slope = (near[0] - near[1]) / 2e-6
+        assert moved_slope(known, far) == pytest.approx(slope, rel=1e-3)

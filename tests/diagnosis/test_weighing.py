@@ -88,24 +88,6 @@ def test_a_value_far_from_its_prior_is_rare_and_not_ruled_out() -> None:
         assert loss_by_values(found) == pytest.approx(math.log1p(times**2))
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "distance"),
-    [
-        # an area cannot be negative: a hundredth of it is rarer than the difference says
-        ("valve.discharge_area_max", 0.01, math.log(100.0) / 0.1),
-        ("valve.discharge_area_max", 1.2, 2.0),
-        ("sensors.pressure_zero", 0.01, None),
-    ],
-)
-def test_how_far_a_value_is(name: str, value: float, distance: float | None) -> None:
-    nominal, tolerance = 1.0, 0.1
-    moved = (value - nominal) / tolerance
-    known = {"moved": {name: moved}, "scales": {name: tolerance}}
-    found = made_up(RIG, name, {}, {name: value}, **known)
-    expected = abs(moved) if distance is None else max(distance, abs(moved))
-    assert found.outside(1.0) == pytest.approx(math.log(expected))
-
-
 def test_of_two_the_one_that_leaves_less() -> None:
     """A hundredth of a strong mismatch is far above the noise; a hundredth of the noise is not."""
     far = weighed(hypothesis(CREEP, 1e-2), hypothesis(DAMPING, 1e-6))

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
-import jsonschema
 import numpy as np
 import pytest
 
 import pamrs
 from pamrs.diagnosis.evidence import Attempts, Candidate
 from pamrs.diagnosis.fit import Problem, fit
-from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
-from pamrs.diagnosis.search import suspects_at_wall
+from pamrs.diagnosis.search import suspected_values
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, _needless
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.diagnosis.asked import ROLES, SETTINGS, diagnosed, problem_of
+from tests.diagnosis.kept import kept
 from tests.diagnosis.noisy import SHOULDER, driven
 
 RIG = pamrs.rigs.shoulder()
@@ -74,7 +72,7 @@ def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor
     assert share > 0.85
     assert name.replace(".", " ").replace("_", " ") in found.headline
     assert found.text.startswith("The rig file is wrong")
-    jsonschema.validate(json.loads(found.to_json()), schema())
+    kept(found)
 
 
 def test_a_value_inside_its_tolerance_is_not_called_wrong() -> None:
@@ -109,7 +107,7 @@ def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     problem = problem_of(RIG, [recorded(true, "fit", 1, seconds=12.0)], "arm")
     white = {"arm": 1.0}
     baseline = fit(problem, RIG, (), {}, white, evaluations=20)
-    found = suspects_at_wall(baseline, problem.blocks)
+    found = suspected_values(baseline, problem.blocks)
     assert ("arm.payload",) in found
     assert ("arm.payload", "arm.first_moment") in found
     assert all(abs(baseline.moved[name]) <= 3.0 + 1e-9 for name in baseline.moved)
@@ -166,7 +164,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
         ("chamber.dead_volume", "valve.discharge_area_max"),
     ]
     gains = dict.fromkeys(pairs, 1e6) | {("muscle.modulus_scale",): 50.0, ("arm.viscous",): 3.0}
-    monkeypatch.setattr(wrong_parameters, "suspects_at_wall", lambda *_: list(gains))
+    monkeypatch.setattr(wrong_parameters, "suspected_values", lambda *_: list(gains))
     monkeypatch.setattr(wrong_parameters, "_predicted_gain", lambda *_: gains)
     asked: list[tuple[str, ...]] = []
 

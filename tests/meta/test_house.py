@@ -1,6 +1,5 @@
 """Rules of the house that no linter knows."""
 
-import ast
 import doctest
 import importlib
 import inspect
@@ -108,33 +107,6 @@ def test_public_names_exist():
         assert getattr(pamrs, name) is not None
     with pytest.raises(AttributeError, match="nonsense"):
         _ = pamrs.nonsense
-
-
-MOST_LINES = 70
-
-
-def functions(path):
-    """Name and lines of code of every function: without its signature, docstring, comments and
-    blank lines, as clippy counts.
-    """
-    text = path.read_text(encoding="utf-8")
-    lines = text.splitlines()
-    for node in ast.walk(ast.parse(text)):
-        if not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            continue
-        body = node.body[ast.get_docstring(node) is not None :]
-        own = lines[body[0].lineno - 1 : node.end_lineno] if body else []
-        yield node.name, sum(bool(line.strip()) and line.strip()[0] != "#" for line in own)
-
-
-def test_functions_can_be_read_in_one_sitting():
-    found = []
-    for folder in ("python/pamrs", "trial", "benchmarks", "reproduction"):
-        for path in sorted((ROOT / folder).rglob("*.py")):
-            name = path.relative_to(ROOT).as_posix()
-            found += [((name, function), count) for function, count in functions(path)]
-    assert len(found) > 1000
-    assert not {key: n for key, n in found if n > MOST_LINES}
 
 
 def plain(name):

@@ -20,7 +20,6 @@ LAYERS = (
     ("units", "channels"),
     ("declared", "_checks"),
     (
-        "comparison",
         "findings",
         "_arrays",
         "_files",
@@ -45,16 +44,7 @@ LAYERS = (
 )
 #: The same inside the diagnosis: its steps, then the result, what is said of it, and who runs it.
 STEPS = ("settings", "prepare", "fit", "noise", "screen", "evidence", "search", "model")
-STEPS_OF_A_DIAGNOSIS = (
-    *STEPS,
-    "ready",
-    "next_experiment",
-    "result",
-    "schema",
-    "explain",
-    "",
-    "prove",
-)
+STEPS_OF_A_DIAGNOSIS = (*STEPS, "ready", "next_experiment", "result", "explain", "")
 #: Names that a module may take from the root package, which loads all others on first use.
 FROM_ROOT = {"_core", "__version__"}
 
@@ -148,6 +138,38 @@ def test_no_modules_import_each_other():
         graphlib.TopologicalSorter(needs).prepare()
     except graphlib.CycleError as error:
         pytest.fail(f"a cycle of imports: {' <- '.join(error.args[1])}")
+
+
+#: Functions that load a module whose name is a value, which the graph of imports does not see.
+LOADERS = {"import_module", "__import__", "exec_module"}
+
+
+def loaded_by_name(path: Path) -> list[str]:
+    """How each name of a module begins that a file loads as a value; empty of one not known."""
+    text = path.read_text(encoding="utf-8")
+    found = []
+    for call in ast.walk(ast.parse(text)) if any(name in text for name in LOADERS) else ():
+        named = {getattr(getattr(call, "func", None), key, "") for key in ("attr", "id")}
+        if isinstance(call, ast.Call) and named & LOADERS:
+            first = call.args[0]
+            first = first.values[0] if isinstance(first, ast.JoinedStr) else first
+            found.append(str(first.value) if isinstance(first, ast.Constant) else "")
+    return found
+
+
+def test_no_module_of_ours_is_loaded_by_its_name_from_outside_its_package():
+    """The root alone loads everything on first use; a package loads so what is inside it."""
+    home = ROOT / "python"
+    files = [path.relative_to(home) for path in sorted((home / "pamrs").rglob("*.py"))]
+    found = [(path, name) for path in files for name in loaded_by_name(home / path)]
+    assert len(found) > 3
+    assert not [
+        (path, name)
+        for path, name in found
+        if path.parent.name != "pamrs"
+        and not name.startswith(".".join(path.parent.parts) + ".")
+        and (not name or name.startswith("pamrs"))
+    ]
 
 
 def test_only_the_core_and_the_version_come_from_the_root():

@@ -156,7 +156,7 @@ def test_the_free_run_is_drawn_first_with_what_it_misses() -> None:
     trace = replace(synthetic.trace("random", "held_out", "muscle_pressure", "Pa", 3e5), refit=None)
     error = FreeRunError("Pa", 22800.0, 610.0, 900.0, 400.0, 400.0)
     run = FreeRun("random", "held_out", 30.0, {"muscle_pressure": error})
-    found = synthetic.diagnosis(free_run=[run], free_traces=[trace])
+    found = synthetic.diagnosis(free_run=[run], free_traces=[trace], traces=[])
     (panel,) = figures.free_panels(found)
     assert panel.title == "muscle pressure [bar]: missed by 0.23, mended 0.0061"
     assert [line.name for line in panel.lines] == ["measured", "your model", "mended model"]
@@ -194,7 +194,9 @@ def test_the_first_screen_is_a_page(tmp_path: Path) -> None:
 def test_ambiguity_is_shown_only_when_open(page: str) -> None:
     assert "cannot separate" not in page
     html = render_html(
-        synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]])
+        synthetic.diagnosis(
+            ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]], traces=[]
+        )
     )
     assert "cannot separate" in html
     assert '<li>muscle leak + heat transfer <span class="note">(0.01)</span></li>' in html
@@ -231,15 +233,15 @@ def test_decimation_keeps_extremes_and_gaps() -> None:
     assert np.isnan(v[(t >= 71_000) & (t < 79_000)]).all()
 
 
-def test_the_final_model_is_called_what_it_is() -> None:
+def test_the_final_model_is_called_what_it_is(page: str) -> None:
     named = synthetic.diagnosis()
     assert words.model_name(named) == "mended model"
     bare = {"effects": [], "wrong_parameters": [], "unexplained": []}
-    refitted = synthetic.diagnosis(verdict="unlisted", **bare)
+    refitted = synthetic.diagnosis(verdict="unlisted", traces=[], **bare)
     assert words.model_name(refitted) == "refitted model"
     nothing = synthetic.diagnosis(verdict="none", **bare)
     assert words.model_name(nothing) == "your model"
-    assert "<th>mended model</th>" in render_html(named)
+    assert "<th>mended model</th>" in page
     assert "<th>mended model</th>" not in render_html(refitted)
 
 
@@ -263,7 +265,7 @@ def test_a_whisker_is_drawn_where_its_text_says() -> None:
         term("effect", "muscle_creep", 1.196, [0.3, 2.5]),
         term("unexplained", "", 0.004, [0.0, 0.01]),
     ]
-    html = render_html(synthetic.diagnosis(budget=terms))
+    html = render_html(synthetic.diagnosis(budget=terms, traces=[]))
     rows = re.findall(r'<i class="\w+" style="([^"]+)"></i><b style="([^"]+)">.*?</tr>', html, re.S)
     assert [text for text in ("\u221220 %", "120 %", "under 1 %") if text not in html] == []
 

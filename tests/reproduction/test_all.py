@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import reproduction
-from pamrs.comparison import KINDS, judge
 from reproduction import CHAPTERS, store
 from reproduction.__main__ import main
+from reproduction.comparison import KINDS, judge
 from reproduction.page import Picture, Section, page
 from reproduction.summary import counts, summary
 from tests.reproduction.pages import DOCS, facts, page_of

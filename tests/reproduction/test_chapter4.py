@@ -105,6 +105,24 @@ def test_a_plant_hides_its_effects_and_shares_its_valve():
         lift.lifts(["no such plant"])
 
 
+def test_the_perturbed_plant_is_off_by_what_it_says():
+    rig = lift.assumed(VARIANTS[chapter4.SMOOTH])
+    plant = lift.perturbed(rig, 7)
+    assert lift.perturbed(rig, 7).model == plant.model != lift.perturbed(rig, 8).model
+    names = ("viscous", "coulomb", "inertia", "payload")
+    viscous, coulomb, inertia, payload = (
+        plant.parameter(f"arm.{n}").value / rig.parameter(f"arm.{n}").value for n in names
+    )
+    assert viscous == pytest.approx(coulomb)
+    assert payload == 1.0
+    # at rest length the pressure's part of the force goes with the cross-section
+    pull = [float(r.muscle.force(8e5, 0.0) - r.muscle.force(0.0, 0.0)) for r in (rig, plant)]
+    size = [r.parameter("muscle.rest_diameter").value for r in (rig, plant)]
+    force = (size[1] / size[0]) ** 2
+    assert pull[1] / pull[0] == pytest.approx(force, rel=0.02)
+    assert all(0.025 <= abs(factor - 1.0) <= 0.05 for factor in (viscous, inertia, force))
+
+
 @pytest.mark.slow
 def test_every_trial_changes_what_the_arm_does():
     """An effect that a rig has no part for would be a trial of nothing."""

@@ -113,7 +113,7 @@ def test_vented_muscles_that_bow_out_cost_nothing(one):
 
 
 def test_arm_of_the_test_matrix_is_just_not_lifted():
-    from pamrs.design import lift
+    from reproduction.lifting import lift
 
     least, most = chapter6._moments()
     assert most - least == pytest.approx(9.0 * 0.9)

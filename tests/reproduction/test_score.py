@@ -8,9 +8,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from pamrs.comparison import BASES, KINDS, judge
 from reproduction import CHAPTERS, chapter4, chapter5, chapter5_comparison, tracking
 from reproduction.chapter4_statements import on_stop, restless, statements
+from reproduction.comparison import BASES, KINDS, judge
 from reproduction.lift import GAINS, Map
 from tests.reproduction.pages import facts, page_of
 from tests.reproduction.test_chapter4 import made, verdicts

@@ -9,6 +9,7 @@ import pytest
 
 import pamrs
 from pamrs.fit import ForceMap, fit_muscle
+from pamrs.report.motion import write_channels
 from pamrs.rig import parse_rig
 from tests.simulation.refusals import refused
 from tests.tables import rows_of, text_of
@@ -138,4 +139,4 @@ def test_pictures_of_a_bench_and_of_nothing_that_moves(tmp_path: Path) -> None:
         pamrs.simulate(rig, sample_time=0.01, length=[0.27, 0.27], pressure=[1e5] * 2),
         pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=0.1, duration=0.0),
     ):
-        assert run.figure(tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+        assert write_channels(run, tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import pamrs
+from pamrs.report.motion import write_animation
 from tests.scripts import script
 from tests.simulation.refusals import refused
 
@@ -148,7 +149,7 @@ def test_an_animation_lasts_as_long_as_it_says(tmp_path) -> None:
     command = np.full(int(duration * 50) + 1, 5.2)
     run = pamrs.simulate(pamrs.rigs.shoulder(), command, sample_time=0.02)
     lasts = 0.0
-    with image.open(run.animate(tmp_path / "arm.gif", speed=speed)) as picture:
+    with image.open(write_animation(run, tmp_path / "arm.gif", speed=speed)) as picture:
         for frame in range(picture.n_frames):
             picture.seek(frame)
             lasts += picture.info["duration"] / 1e3

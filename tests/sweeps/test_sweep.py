@@ -72,13 +72,18 @@ def test_everything_has_its_unit(tmp_path):
 
 
 def test_samples_are_rows_with_their_parameters(tmp_path):
-    columns = {"arm.payload": [2.0, 5.0, 9.0], "initial.joint_angle": [0.4, 0.6, 0.8]}
-    data = small(tmp_path / "out.zarr", pamrs.sweeps.Samples(columns), chunk=2)
+    """Cut into chunks and gone on with as a grid is."""
+    names, rows = ["arm.payload", "initial.joint_angle"], np.array([[2, 0.4], [5, 0.6], [9, 0.8]])
+    data = small(tmp_path / "out.zarr", names, samples=rows, chunk=2)
     assert data["end"].dims == ("run",)
     assert data["arm.payload"].values.tolist() == [2.0, 5.0, 9.0]
+    assert data["arm.payload"].attrs["units"] == "kg"
     assert "arm.payload" in data.coords
     run = one_run(5.0, 0.6, 1.5e-4)
     assert float(data["end"][1]) == pytest.approx(run["joint_angle"][-1], rel=1e-7)
+    same(data, small(tmp_path / "whole.zarr", names, samples=rows, chunk=3))
+    with pytest.raises(pamrs.ParameterError, match="samples of arm.payload: other numbers"):
+        small(tmp_path / "out.zarr", names, samples=rows + [1.0, 0.0], chunk=2)
 
 
 def test_geometry_makes_other_rigs_and_an_impossible_one_has_ended(tmp_path):
@@ -221,6 +226,10 @@ def test_chunks_part_the_runs(shape, chunk):
         ({"over": {"arm.payload": [[1.0]]}}, r"arm.payload has the shape \(1, 1\)"),
         ({"over": {"arm.payload": ["heavy"]}}, "arm.payload = .* is not allowed: numbers"),
         ({"over": {"initial.angle": [0.5]}}, "unknown entry 'angle'"),
+        ({"samples": [[1.0]]}, "over = .* with samples= it lists the names"),
+        ({"over": ["arm.payload"], "samples": [5.0, 9.0]}, r"shape \(2,\); \(runs, 1\) is"),
+        ({"over": ["arm.payload"] * 2, "samples": [[5.0, 9.0]]}, "over = .* each name once"),
+        ({"over": ["arm.payload"], "samples": [[-1.0]]}, r"arm.payload\[0\] = -1 kg"),
         ({"metrics": {}}, "metrics is empty"),
         ({"metrics": {"end": "joint_angle"}}, r"metrics\['end'\] = 'joint_angle' is not allowed"),
         (

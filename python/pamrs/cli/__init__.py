@@ -1,12 +1,11 @@
-"""The command line: ``pamrs diagnose``, ``effects``, ``prove``, ``fit``, ``import``, ``library``,
-``lift``, ``simulate``, ``size``, ``rig``, ...
+"""The command line: ``pamrs diagnose``, ``effects``, ``fit``, ``import``, ``simulate``,
+``size``, ``rig``, ...
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
 command did its work (a diagnosis that finds nothing missing included), 1 when it was interrupted, 2
-when the input is wrong or an output could not be written from the start (nothing was done then), 3
-when ``prove`` has a case without a result, 4 when the work was done, but a file of it or its text
-could not be written. Everything heavy is imported inside the command that
-needs it, so that ``pamrs --help`` answers at once.
+when the input is wrong or an output could not be written from the start (nothing was done then), 4
+when the work was done, but a file of it or its text could not be written. Everything heavy is
+imported inside the command that needs it, so that ``pamrs --help`` answers at once.
 """
 
 from __future__ import annotations
@@ -28,12 +27,8 @@ from pamrs.cli.effects import effects_command
 from pamrs.cli.example import example_command
 from pamrs.cli.fit import fit_app
 from pamrs.cli.import_logs import import_command
-from pamrs.cli.library import library_command
-from pamrs.cli.lift import lift_command
-from pamrs.cli.prove import prove_command
 from pamrs.cli.replay import replay_command
 from pamrs.cli.rig import rig_app
-from pamrs.cli.schema import schema_command
 from pamrs.cli.simulate import simulate_command
 from pamrs.cli.size import size_command
 from pamrs.cli.studio import studio_command
@@ -54,8 +49,8 @@ app = typer.Typer(
         "Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out."
     ),
     epilog=(
-        "Exit codes: 0 done; 1 interrupted; 2 wrong input, nothing done; 3 prove: a case has no "
-        "result; 4 done, but a file or the text could not be written."
+        "Exit codes: 0 done; 1 interrupted; 2 wrong input, nothing done; 4 done, but a file or the "
+        "text could not be written."
     ),
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -69,11 +64,7 @@ app.command("simulate")(simulate_command)
 app.command("effects")(effects_command)
 app.command("example")(example_command)
 app.command("import")(import_command)
-app.command("library")(library_command)
-app.command("lift")(lift_command)
-app.command("prove")(prove_command)
 app.command("replay")(replay_command)
-app.command("schema")(schema_command)
 app.command("size")(size_command)
 app.command("studio")(studio_command)
 app.command("compare")(compare_command)
@@ -130,8 +121,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what), 3 a
-        case without a result, 4 done, but a file or the text could not be written.
+        Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what), 4
+        done, but a file or the text could not be written.
 
     Examples
     --------

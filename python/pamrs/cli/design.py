@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from pamrs._checks import refused
-from pamrs._writing import check_writable, write_atomically
+from pamrs._writing import check_writable
 from pamrs.cli._shared import (
     Contents,
     counted,
@@ -21,19 +20,13 @@ from pamrs.cli._shared import (
     named_muscle,
     write,
 )
+from pamrs.cli.completion import muscle_names
 from pamrs.units import bar_and_psi
 
 if TYPE_CHECKING:
-    from pamrs.design import (
-        JointDesign,
-        JointProblem,
-        MethodComparison,
-        ParetoFront,
-        PressureSearch,
-    )
+    from pamrs.design import JointDesign, JointProblem
 
 SCHEMA: Final = "pamrs.joint_design/1"
-_METHODS: Final = ("ga", "de", "cma")
 
 design_app = typer.Typer(help="Find dimensions that meet a requirement.")
 
@@ -45,9 +38,12 @@ def _root() -> None:
 
 @design_app.command("joint")
 def _joint(
-    context: typer.Context,
     muscle: Annotated[
-        str, typer.Option(help="A muscle of the library, or a rig file (TOML) with one.")
+        str,
+        typer.Option(
+            help="A muscle of the library, or a rig file (TOML) with one.",
+            autocompletion=muscle_names,
+        ),
     ],
     count: Annotated[int, typer.Option(help="Muscles in parallel.")],
     torque: Annotated[str, typer.Option(help='Wanted over the whole range, like "788 ft lbf".')],
@@ -56,9 +52,6 @@ def _joint(
     ],
     max_angle: Annotated[str, typer.Option(help='Like "120 deg".')],
     pressure: Annotated[str, typer.Option(help='Gauge pressure, like "190 psi".')],
-    method: Annotated[
-        str, typer.Option(help="ga (as published), de (differential evolution) or cma (CMA-ES).")
-    ] = "ga",
     bounds: Annotated[
         list[str] | None,
         typer.Option(
@@ -67,29 +60,17 @@ def _joint(
     ] = None,
     max_stroke: Annotated[str, typer.Option(help="Largest stroke over the rest length.")] = "15 %",
     evaluations: Annotated[
-        int, typer.Option(help="Designs tried in a search; 1820 are 100 generations as published.")
-    ] = 1820,
-    mutation: Annotated[
-        float,
-        typer.Option(
-            help="Chance of the genetic algorithm that a child gets one length at random."
-        ),
-    ] = 0.2,
+        int | None,
+        typer.Option(help="Designs tried; 1820 by default, 4000 with --minimise-pressure."),
+    ] = None,
     minimise_pressure: Annotated[
         bool,
         typer.Option(
             "--minimise-pressure",
-            help="Repeat at other pressures for the least that does; also by direct search.",
+            help="Look for the joint that gives the torque at the least pressure.",
         ),
     ] = False,
-    compare: Annotated[
-        bool, typer.Option("--compare", help="Also run all methods with ten seeds each.")
-    ] = False,
-    pareto: Annotated[
-        bool, typer.Option("--pareto", help="Also find pressure against size.")
-    ] = False,
     seed: Annotated[int, typer.Option(help="The same seed gives the same result.")] = 0,
-    png: Annotated[Path | None, typer.Option(help="Write the picture.")] = None,
     json: Annotated[Path | None, typer.Option(help=json_help(SCHEMA))] = None,
     rig_joint: Annotated[
         Path | None, typer.Option(help="Write the block [joint] of a rig file.")
@@ -98,81 +79,25 @@ def _joint(
     """Find the four lengths of a tendon joint that give a torque over a range of angles
     (dissertation 3.5).
     """
-    check_writable(png, file_of(json), rig_joint)
-    if method not in _METHODS:
-        raise typer.BadParameter(f"--method = {method!r} is not allowed: {', '.join(_METHODS)}")
+    check_writable(file_of(json), rig_joint)
+    from pamrs.design import least_pressure, optimise
 
     problem = _problem(
         muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke
     )
-    found = _found(context, problem)
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
-    caption = f"{title}: {bar_and_psi(found.design.problem.pressure)}"
-
-    def draw(path: Path) -> None:
-        from pamrs.design.figures import summary_png
-
-        picture = summary_png(found.design, caption, comparison=found.comparison, front=found.front)
-        write_atomically(path, picture)
-
+    told, found = title, None
+    given: dict[str, Any] = {} if evaluations is None else {"evaluations": evaluations}
+    with counted("designs") as say:
+        if minimise_pressure:
+            found = least_pressure(problem, seed=seed, progress=say, **given)
+            told = f"{title}: {_least(problem, found)}"
+        found = found or optimise(problem, seed=seed, progress=say, **given)
     contents: Contents = {
-        json: _document(title, found) if json else "",
-        rig_joint: found.design.to_toml() if rig_joint else "",
-        png: draw,
+        json: _document(title, seed, found) if json else "",
+        rig_joint: found.to_toml() if rig_joint else "",
     }
-    write(contents, f"{title}\n{_summary(found)}")
-
-
-# ------------------------------------------------------------------------- search
-
-
-@dataclass(frozen=True)
-class _Found:
-    """The design, and what else was asked for."""
-
-    design: JointDesign
-    lowest: PressureSearch | None = None
-    strict: JointDesign | None = None
-    comparison: MethodComparison | None = None
-    front: ParetoFront | None = None
-
-
-def _found(context: typer.Context, problem: JointProblem) -> _Found:
-    """The design, at the least pressure where that is asked for (by repeated searches and by a
-    direct one), with the comparison and the front.
-    """
-    from pamrs.design import (
-        Genetic,
-        compare_methods,
-        least_pressure,
-        minimum_pressure,
-        optimise,
-        pareto_front,
-    )
-
-    given = context.params
-    method, evaluations, seed = (given[key] for key in ("method", "evaluations", "seed"))
-    options = {"evaluations": evaluations, "seed": seed}
-    genetic = Genetic(mutation=given["mutation"])
-    if given["minimise_pressure"]:
-        with counted("pressures") as say:
-            lowest = minimum_pressure(problem, method, genetic=genetic, **options, progress=say)
-        with counted("designs") as say:
-            strict = least_pressure(problem, seed=seed, progress=say)
-        found = _Found(lowest.design, lowest, strict)
-    else:
-        with counted("designs") as say:
-            found = _Found(optimise(problem, method, genetic=genetic, **options, progress=say))
-    problem = found.design.problem
-    if given["compare"]:
-        lasting = replace(genetic, tolerance=None)
-        with counted("runs") as say:
-            runs = compare_methods(problem, evaluations=evaluations, genetic=lasting, progress=say)
-        found = replace(found, comparison=runs)
-    if given["pareto"]:
-        with counted("generations") as say:
-            found = replace(found, front=pareto_front(problem, seed=seed, progress=say))
-    return found
+    write(contents, f"{told}\n{found.summary()}")
 
 
 # ------------------------------------------------------------------------- inputs
@@ -230,55 +155,19 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
 # ------------------------------------------------------------------------ outputs
 
 
-def _summary(found: _Found) -> str:
-    """What goes to standard output behind the title."""
-    text = found.design.summary()
-    if found.lowest is not None:
-        text += f"\n\n{found.lowest.summary()}\n{_strict_line(found.strict)}"
-    if found.comparison is not None:
-        pressure = bar_and_psi(found.design.problem.pressure)
-        text += f"\n\nJ in joule at {pressure}\n{found.comparison.table()}"
-    if found.front is not None:
-        text += f"\n\n{_front_table(found.front)}"
-    return text
-
-
-def _strict_line(design: JointDesign | None) -> str:
-    """What the direct search found."""
-    if design is None:
-        return "strict, direct search: no design was found that any pressure makes good enough"
-    assert design.search is not None
-    found = f"{bar_and_psi(design.problem.pressure)} gives the torque at every angle"
-    return (
-        f"strict, direct search: {found} ({design.search.method}, {design.search.evaluations} "
-        "evaluations)"
+def _least(problem: JointProblem, found: JointDesign | None) -> str:
+    """The least pressure that a search found, with what any joint needs."""
+    bound = bar_and_psi(problem.least_possible_pressure())
+    least = (
+        "no design was found that any pressure makes good enough"
+        if found is None
+        else f"the least pressure found is {bar_and_psi(found.problem.pressure)}"
     )
+    return f"{least}; no joint of any shape could do with less than {bound}"
 
 
-def _front_table(front: ParetoFront) -> str:
-    """About a dozen designs of the front."""
-    import numpy as np
-
-    from pamrs.design import SYMBOLS
-
-    if not len(front.size):
-        return "no design was found that any pressure makes good enough"
-    lines = [
-        "pressure against size: radius about the axis that holds the tendon's ends",
-        f"{'mm':>9}{'bar':>9}" + "".join(f"{s:>9}" for s in SYMBOLS),
-    ]
-    for index in np.unique(np.linspace(0, len(front.size) - 1, 12).round().astype(int)).tolist():
-        numbers = [
-            1e3 * front.size[index],
-            front.pressure[index] / 1e5,
-            *(1e3 * front.lengths[index]),
-        ]
-        lines.append("".join(f"{number:>9.2f}" for number in numbers))
-    return "\n".join(lines)
-
-
-def _document(title: str, found: _Found) -> str:
-    problem = found.design.problem
+def _document(title: str, seed: int, found: JointDesign) -> str:
+    problem = found.problem
     keys = ("count", "torque", "min_angle", "max_angle")
     return document(
         SCHEMA,
@@ -289,9 +178,6 @@ def _document(title: str, found: _Found) -> str:
             "bounds": {name: list(pair) for name, pair in problem.bounds.items()},
             "max_contraction": problem.max_contraction,
         },
-        design=found.design,
-        minimum_pressure=found.lowest,
-        least_pressure=found.strict,
-        comparison=None if found.comparison is None else found.comparison.rows(),
-        front=found.front,
+        seed=seed,
+        design=found,
     )

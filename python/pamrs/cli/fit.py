@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from pamrs._checks import refused
-from pamrs._writing import check_writable, write_atomically
+from pamrs._writing import check_writable
 from pamrs.cli._shared import (
     GEOMETRY,
     AllowOutside,
@@ -27,10 +27,10 @@ from pamrs.cli._shared import (
     quantity,
     write,
 )
-from pamrs.errors import ParameterError, RecordingError
+from pamrs.errors import FitError, ParameterError, RecordingError
 
 if TYPE_CHECKING:
-    from pamrs.fit import ForceMap, FrictionFit, ModelComparison, MuscleFit
+    from pamrs.fit import CrossValidation, ForceMap, FrictionFit, ModelComparison, MuscleFit
     from pamrs.rig import Muscle, Rig
 
 SCHEMA: Final = "pamrs.muscle_fit/1"
@@ -106,7 +106,6 @@ _Friction = Annotated[
     ),
 ]
 _Compare = Annotated[bool, typer.Option("--compare", help="Fit every model and rank them.")]
-_Report = Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")]
 _FittedRig = Annotated[
     Path | None,
     typer.Option(
@@ -147,22 +146,20 @@ def _muscle(
     per_level: _PerLevel = False,
     friction: _Friction = None,
     compare: _Compare = False,
-    report: _Report = None,
     rig: _FittedRig = None,
     json: _Result = None,
     png: _Picture = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
-    check_writable(report, rig, file_of(json), png)
+    check_writable(rig, file_of(json), png)
     if per_level and rig is not None:
         raise typer.BadParameter(
             "a rig needs moduli linear in pressure: leave out --per-level or --rig"
         )
     inputs = _inputs(context)
     shape, notes = _shape(context, inputs)
-    from pamrs.fit import FitError, fit_muscle
-    from pamrs.fit import report as pages
+    from pamrs.fit import fit_muscle
 
     with progress(f"fitting {inputs.data.label}"):
         try:
@@ -173,12 +170,10 @@ def _muscle(
             summary = _summary(fit, comparison, words, notes)
         except FitError as error:
             raise FitError("; ".join([str(error), *inputs.data.notes])) from error
-    command = _command(context)
     contents: Contents = {
         json: _muscle_document(fit, comparison, rubbing, context) if json else "",
         rig: fit.to_rig(inputs.rig).to_toml_text() if rig else "",
-        png: lambda path: pages.write_figure(fit, path, comparison),
-        report: lambda path: pages.write_report(fit, path, comparison, command=command),
+        png: fit.figure,
     }
     write(contents, summary)
     if rig is not None and inputs.rig is None:
@@ -244,23 +239,20 @@ def _friction(
     clipped: _Clipped = None,
     floor: Annotated[float, typer.Option(help="The least that c_F becomes.")] = 0.01,
     json: Annotated[Path | None, typer.Option(help=json_help(FRICTION_SCHEMA))] = None,
-    png: _Picture = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Fit the friction c_F = max(c0 + c1 P, floor) of a muscle to its hysteresis loops; of its
     geometry, the rest length is enough.
     """
-    check_writable(file_of(json), png)
+    check_writable(file_of(json))
     map_ = _loops(context).with_directions()
     from pamrs.fit import fit_friction
-    from pamrs.fit.report import render_friction_png
 
     with progress(f"fitting {map_.label}"):
         fit = fit_friction(map_, floor=floor)
     rows = len(map_)
     contents: Contents = {
-        json: _document(FRICTION_SCHEMA, map_, context, rows=rows, fit=fit) if json else "",
-        png: lambda path: write_atomically(path, render_friction_png(fit, map_)),
+        json: _document(FRICTION_SCHEMA, map_, context, rows=rows, fit=fit) if json else ""
     }
     write(contents, f"{map_.label}: {fit.fit_report()}")
 
@@ -278,7 +270,6 @@ def _rubbing(
     the elbow's model, which has a branch of its own for lengthening.
     """
     from pamrs.fit import fit_friction
-    from pamrs.fit.remarks import friction_words
 
     data, muscle = inputs.data, inputs.muscle
     if choice is FrictionChoice.none:
@@ -286,8 +277,7 @@ def _rubbing(
     loops = data.has_loops
     alone = loops and not muscle.has_friction and (model or muscle.model) != "elbow_linear"
     if choice is FrictionChoice.muscle or (choice is None and not alone):
-        law = friction_words(muscle) if loops else ""
-        return muscle, None, f"friction as the muscle has it: {law}" if law else ""
+        return muscle, None, _own_friction(muscle) if loops and muscle.has_friction else ""
     seen = data if pressures is None else data.select(levels=data.level_indices(pressures))
     try:
         found = fit_friction(seen)
@@ -307,6 +297,14 @@ def _rubbing(
     )
     words = f"friction, fitted to the loops before the moduli: {line}"
     return found.to_muscle(muscle), found, words
+
+
+def _own_friction(muscle: Muscle) -> str:
+    """The friction law (2.36) that a muscle has, in words."""
+    law = ("friction_coefficient", "friction_pressure_slope", "friction_floor")
+    c0, c1, floor = (muscle.parameters[name] for name in law)
+    numbers = f"c0 = {c0:.4g}, c1 = {1e6 * c1:.4g} 1/MPa"
+    return f"friction as the muscle has it: c_F = max(c0 + c1 P, {floor:.4g}), {numbers}"
 
 
 def _comparison(
@@ -481,9 +479,7 @@ def _summary(
     fit: MuscleFit, comparison: ModelComparison | None, friction: str, notes: Sequence[str]
 ) -> str:
     """What goes to standard output."""
-    from pamrs.fit.remarks import cross_validation
-
-    cross, reason = cross_validation(fit)
+    cross, reason = _left_out(fit)
     lines = [
         fit.fit_report().rstrip("\n"),
         *(f"  note: {note}" for note in notes),
@@ -496,6 +492,14 @@ def _summary(
         lines.append(f"  leave one pressure out: {numbers} of the map's largest force")
     text = "\n".join(lines) + "\n"
     return text if comparison is None else f"{text}\n{comparison.to_text()}"
+
+
+def _left_out(fit: MuscleFit) -> tuple[CrossValidation | None, str]:
+    """Leave-one-pressure-out, or None and why there is none."""
+    try:
+        return fit.leave_one_pressure_out(), ""
+    except FitError as error:
+        return None, str(error)
 
 
 def _command(context: typer.Context) -> str:
@@ -523,9 +527,7 @@ def _muscle_document(
     friction: FrictionFit | None,
     context: typer.Context,
 ) -> str:
-    from pamrs.fit.remarks import cross_validation
-
-    cross, _ = cross_validation(fit)
+    cross, _ = _left_out(fit)
     return _document(
         SCHEMA,
         fit.data,

@@ -61,8 +61,10 @@ def replay_command(
             drawn = own or nominal
             beside = None if own is None else nominal
     if plot is not None and drawn is not None:
+        from pamrs.report.motion import write_channels
+
         result, recorded = drawn, usable_samples(shown)
-        write({plot: lambda path: result.figure(path, recorded=recorded, nominal=beside)})
+        write({plot: lambda path: write_channels(result, path, recorded=recorded, nominal=beside)})
 
 
 def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, Rig | None]:

@@ -111,7 +111,7 @@ def simulate_command(
             lines.append(with_unit(told, unit))
     files: Contents = {
         output: lambda path: _write_csv(path, result),
-        plot: lambda path: result.figure(path, recorded=recorded),
+        plot: lambda path: _plot(path, result, recorded),
         animation: lambda path: _animate(path, result, speed),
     }
     write(files, "\n".join(lines))
@@ -129,9 +129,17 @@ def _recorded(path: Path) -> Recording:
         ) from None
 
 
+def _plot(path: Path, result: Simulation, recorded: dict[str, tuple[Any, Any]]) -> None:
+    from pamrs.report.motion import write_channels
+
+    write_channels(result, path, recorded=recorded)
+
+
 def _animate(path: Path, result: Simulation, speed: float) -> None:
+    from pamrs.report.motion import write_animation
+
     with progress("drawing the motion"):
-        result.animate(path, speed=speed)
+        write_animation(result, path, speed=speed)
 
 
 def _say_what_is_held(rig: Rig, recording: Recording, path: Path) -> None:

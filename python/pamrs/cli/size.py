@@ -21,6 +21,7 @@ from pamrs.cli._shared import (
     naming,
     write,
 )
+from pamrs.cli.completion import muscle_names
 from pamrs.errors import ParameterError
 from pamrs.units import same_dimension
 
@@ -43,7 +44,8 @@ def size_command(
     muscle: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of the library, or rig files with --pressure; the whole library by default."
+            help="Names of the library (all by default), or rig files with --pressure.",
+            autocompletion=muscle_names,
         ),
     ] = None,
     pressure: Annotated[

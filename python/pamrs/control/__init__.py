@@ -1,13 +1,8 @@
 """Controllers of the joint angle, sampled, for one arm or a batch of them; trajectories, metrics,
 tuning and stability.
-
-``gym`` is loaded when it is first used, since it needs an extra.
 """
 
 from __future__ import annotations
-
-import importlib
-from typing import Any
 
 from pamrs.control import (
     iosystem,
@@ -131,7 +126,6 @@ __all__ = [
     "closed_loop",
     "fuzzy_rules",
     "fuzzy_surface",
-    "gym",
     "iosystem",
     "linear",
     "live",
@@ -144,13 +138,3 @@ __all__ = [
     "trajectories",
     "tuning",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    if name != "gym":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return importlib.import_module("pamrs.control.gym")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})

@@ -21,7 +21,7 @@ from pamrs.errors import ParameterError
 
 #: A number for all time, or a function of time [s].
 Stiffness: TypeAlias = "Value | Callable[[float], Value]"
-_LEAST_GAIN = 1e-12  # N m/rad per Pa: below it the pressures do not change the stiffness
+_LEAST_STIFFNESS_GAIN = 1e-12  # N m/rad per Pa: below it the pressures do not change the stiffness
 
 
 class Demand(NamedTuple):
@@ -205,8 +205,8 @@ def stiffness_of(value: Any) -> Value | None:
 def _towards(needed: Value, gain: Value, first: Value, last: Value) -> Value:
     """``needed/gain`` within bounds; the first where the gain is nothing."""
     if needed.__class__ is gain.__class__ is first.__class__ is last.__class__ is float:
-        if abs(gain) < _LEAST_GAIN or not math.isfinite(needed):
+        if abs(gain) < _LEAST_STIFFNESS_GAIN or not math.isfinite(needed):
             return first
         return clip(needed / gain, first, last)
-    still = np.abs(gain) < _LEAST_GAIN
+    still = np.abs(gain) < _LEAST_STIFFNESS_GAIN
     return np.where(still, first, clip(needed / np.where(still, 1.0, gain), first, last))

@@ -27,13 +27,11 @@ __all__ = [
     "Metrics",
     "WEIGHTS",
     "combined",
-    "curvature",
     "evaluate",
     "lag",
     "phases",
     "rms",
     "squared_error",
-    "steady_error",
     "total_curvature",
 ]
 
@@ -104,10 +102,15 @@ def squared_error(
     return _plain(_factor(unit) ** 2 * _integral(t, e * e))
 
 
-def curvature(
+def total_curvature(
     time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = None, unit: str = "rad"
-) -> Array:
-    """Absolute curvature of the graph of the angle over time, ``|y''| / (1 + y'^2)^(3/2)`` (4.16).
+) -> float | Array:
+    """Integral of the absolute curvature over time, omega (4.17).
+
+    The curvature (4.16), ``y'' / (1 + y'^2)^(3/2)``, is the time derivative of
+    ``y' / sqrt(1 + y'^2)``, so omega is the total variation of that: exact between samples wherever
+    the rate is monotone between them, and no second derivative is taken. Noise of the angle adds to
+    it at every sample: give a simulated or smoothed one.
 
     Parameters
     ----------
@@ -119,36 +122,6 @@ def curvature(
         [rad/s], where it is known; else central differences of the angle.
     unit : {"rad", "deg", "m"}
         Of the angle's axis.
-
-    Returns
-    -------
-    ndarray, like ``angle``
-        [1/unit] where one unit of angle is drawn as long as a second.
-
-    Raises
-    ------
-    ParameterError
-        As :func:`squared_error`.
-    """
-    t, v = _rate(time, angle, rate, unit)
-    acceleration = np.gradient(v, t, axis=-1)
-    return np.asarray(np.abs(acceleration) / (1.0 + v * v) ** 1.5, dtype=np.float64)
-
-
-def total_curvature(
-    time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = None, unit: str = "rad"
-) -> float | Array:
-    """Integral of the absolute curvature over time, omega (4.17).
-
-    ``y'' / (1 + y'^2)^(3/2)`` is the time derivative of ``y' / sqrt(1 + y'^2)``, so omega is the
-    total variation of that: exact between samples wherever the rate is monotone between them, and
-    no second derivative is taken. Noise of the angle adds to it at every sample: give a simulated
-    or smoothed one.
-
-    Parameters
-    ----------
-    time, angle, rate, unit
-        As for :func:`curvature`.
 
     Returns
     -------
@@ -281,36 +254,6 @@ def lag(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Arra
     shared = (change * 0.5 * (e[..., 1:] + e[..., :-1])).sum(axis=-1)
     # nothing moved: zero, or NaN where a run failed
     return _plain(np.where(moved > 0.0, shared / np.where(moved > 0.0, moved, 1.0), 0.0 * shared))
-
-
-def steady_error(
-    time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, window: float = 1.0
-) -> float | Array:
-    """Mean error over the end of a record.
-
-    Parameters
-    ----------
-    time, reference, angle
-        As for :func:`squared_error`.
-    window : float
-        Length of the end [s], above zero and no longer than the record.
-
-    Returns
-    -------
-    float or ndarray, shape (n,)
-        Reference minus angle [rad].
-
-    Raises
-    ------
-    ParameterError
-        As :func:`squared_error`, or if the window is not allowed.
-    """
-    t, e = _error(time, reference, angle)
-    if not 0.0 < window <= t[-1] - t[0]:
-        raise ParameterError(
-            f"window = {window} s is not allowed: above 0 and at most {t[-1] - t[0]:g} s is needed"
-        )
-    return _plain(e[..., t >= t[-1] - window * (1.0 + 1e-12)].mean(axis=-1))
 
 
 def phases(

@@ -1,36 +1,34 @@
-"""Designing the joint: one search at one pressure, and the comparison of search methods."""
+"""Designing the joint: the best lengths at one pressure, and those that need the least."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import positive
-from pamrs.design._evaluator import Genetic, Progress, Search
+from pamrs._checks import positive, refused, whole
 from pamrs.design._problem import LENGTHS, JointProblem, Scores
-from pamrs.design._search import METHODS, PUBLISHED_EVALUATIONS, search
-from pamrs.errors import ParameterError
 from pamrs.rig import Joint
 from pamrs.units import bar_and_psi
 
 Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
 
 #: Area below the threshold that counts as "essentially zero", over the area under the threshold
 #: [1].
 AREA_TOLERANCE: Final = 1e-3
 
-_QUARTILES: Final = ("best", "quartile_low", "median", "quartile_high", "worst")
+_GENERATION: Final = 20  # designs tried at a time
 _ROUNDING: Final = 1e-9  # a smaller shortfall of torque is none
 
 
 @dataclass(frozen=True)
 class JointDesign:
-    """A joint's four lengths, what they are worth, and the search that found them.
+    """A joint's four lengths, and what they are worth.
 
     Attributes
     ----------
@@ -38,8 +36,8 @@ class JointDesign:
         What was asked.
     lengths : (4,) array
         In the order of :data:`LENGTHS` [m].
-    search : Search or None
-        How they were found; None for a design that was given.
+    evaluations : int
+        Designs that were tried until it was found; 0 for a design that was given.
     area_tolerance : float
         Area below the threshold that counts as zero, over the area under the threshold [1].
 
@@ -51,7 +49,7 @@ class JointDesign:
 
     problem: JointProblem
     lengths: Array
-    search: Search | None = None
+    evaluations: int = 0
     area_tolerance: float = AREA_TOLERANCE
 
     def __post_init__(self) -> None:
@@ -169,23 +167,10 @@ class JointDesign:
         """Numbers of the design in SI units, ready for JSON."""
         scores, problem = self.scores, self.problem
         short, short_angle = self.shortfall
-        found: dict[str, Any] = {}
-        if self.search is not None:
-            history = self.search.history
-            found = {
-                "method": self.search.method,
-                "seed": self.search.seed,
-                "evaluations": self.search.evaluations,
-                "converged": self.search.converged,
-                "history": {
-                    "evaluations": history.evaluations.tolist(),
-                    "best": history.best.tolist(),
-                    "lengths": history.points.tolist(),
-                },
-            }
         return {
             "pressure": problem.pressure,
             "lengths": dict(zip(LENGTHS, self.lengths.tolist(), strict=True)),
+            "evaluations": self.evaluations,
             "met": self.met(),
             "area_tolerance": self.area_tolerance,
             "shortfall": short,
@@ -199,7 +184,6 @@ class JointDesign:
             "size": self.size,
             "angle": problem.angles.tolist(),
             "torque": scores.torque[0].tolist(),
-            **found,
         }
 
     def to_toml(self) -> str:
@@ -224,24 +208,28 @@ class JointDesign:
 
 def optimise(
     problem: JointProblem,
-    method: str = "ga",
     *,
-    evaluations: int = PUBLISHED_EVALUATIONS,
+    evaluations: int = 1820,
     seed: int = 0,
-    genetic: Genetic | None = None,
     area_tolerance: float = AREA_TOLERANCE,
     progress: Progress | None = None,
 ) -> JointDesign:
     """Look for the lengths with the smallest objective at the problem's pressure.
 
+    By SciPy's differential evolution of 20 designs, without polishing.
+
     Parameters
     ----------
     problem : JointProblem
         What is asked.
-    method, evaluations, seed, genetic, progress
-        As for :func:`pamrs.design.search`; by default the algorithm of 3.5 for 100 generations.
+    evaluations : int
+        Designs that are tried, at least 20; rounded up to whole generations of 20.
+    seed : int
+        The same seed gives the same result.
     area_tolerance : float
         Kept in the result, for :meth:`JointDesign.met`; plays no part in the search.
+    progress : callable, optional
+        Called with the designs tried and their number.
 
     Returns
     -------
@@ -253,108 +241,92 @@ def optimise(
     ParameterError
         If an argument is not possible.
     """
-    found = search(
-        lambda points: problem.evaluate(points).fitness,
-        problem.lower,
-        problem.upper,
-        method=method,
-        evaluations=evaluations,
-        seed=seed,
-        genetic=genetic,
-        progress=progress,
+    lengths, _, used = _smallest(
+        lambda points: problem.evaluate(points).fitness, problem, evaluations, seed, progress
     )
-    return JointDesign(problem, found.point, found, area_tolerance)
+    return JointDesign(problem, lengths, used, area_tolerance)
 
 
-@dataclass(frozen=True)
-class MethodComparison:
-    """Search methods at equal numbers of evaluations.
-
-    Attributes
-    ----------
-    methods : tuple of str
-        The methods.
-    seeds : tuple of int
-        The seeds.
-    fitness : (methods, seeds) array
-        Best objective of each run [J].
-    evaluations : (methods, seeds) array
-        Evaluations of each run.
-    """
-
-    methods: tuple[str, ...]
-    seeds: tuple[int, ...]
-    fitness: Array
-    evaluations: NDArray[np.int64]
-
-    def rows(self) -> list[dict[str, Any]]:
-        """For each method the median, quartiles, best and worst objective [J] and the evaluations
-        of one run.
-        """
-        result = []
-        for name, values, used in zip(self.methods, self.fitness, self.evaluations, strict=True):
-            quartiles = np.percentile(values, [0.0, 25.0, 50.0, 75.0, 100.0]).tolist()
-            row = {"method": name, "evaluations": int(used.max()), "runs": len(values)}
-            result.append(row | dict(zip(_QUARTILES, quartiles, strict=True)))
-        return result
-
-    def table(self) -> str:
-        """:meth:`rows` as text, J in joule."""
-        head = "".join(f"{name.replace('_', ' '):>15}" for name in _QUARTILES)
-        lines = [f"{'method':<8}{'evaluations':>12}{'runs':>6}{head}"]
-        for row in self.rows():
-            numbers = "".join(f"{row[name]:>15.6g}" for name in _QUARTILES)
-            lines.append(f"{row['method']:<8}{row['evaluations']:>12}{row['runs']:>6}{numbers}")
-        return "\n".join(lines)
-
-
-def compare_methods(
+def least_pressure(
     problem: JointProblem,
     *,
-    methods: Sequence[str] = METHODS,
-    seeds: Sequence[int] = tuple(range(10)),
-    evaluations: int = PUBLISHED_EVALUATIONS,
-    genetic: Genetic | None = None,
+    largest_size: float = math.inf,
+    evaluations: int = 4000,
+    seed: int = 0,
     progress: Progress | None = None,
-) -> MethodComparison:
-    """Run each method with each seed, all with the same number of evaluations.
+) -> JointDesign | None:
+    """Look for the design with the smallest :meth:`JointProblem.needed_pressure`.
 
     Parameters
     ----------
     problem : JointProblem
-        What is asked.
-    methods : sequence of str
-        Of :data:`pamrs.design.METHODS`.
-    seeds : sequence of int
-        One run each.
-    evaluations : int
-        Of each run.
-    genetic : Genetic, optional
-        Settings of the genetic algorithm; by default as published but without stopping early.
-    progress : callable, optional
-        Called with the runs done and their number.
+        What is asked; its pressure plays no part.
+    largest_size : float
+        Largest :meth:`JointProblem.size` allowed [m].
+    evaluations, seed, progress
+        As for :func:`optimise`.
 
     Returns
     -------
-    MethodComparison
+    JointDesign or None
+        Its problem at the pressure that it needs; None if no design was found that any pressure
+        makes good enough.
 
     Raises
     ------
     ParameterError
-        If there is no method or seed, or an argument is not possible.
+        If an argument is not possible.
     """
-    if not methods or not seeds:
-        raise ParameterError("methods and seeds must not be empty")
-    settings = genetic or Genetic(tolerance=None)
-    fitness = np.zeros((len(methods), len(seeds)))
-    used = np.zeros(fitness.shape, dtype=np.int64)
-    for row, method in enumerate(methods):
-        for column, seed in enumerate(seeds):
-            found = optimise(
-                problem, method, evaluations=evaluations, seed=seed, genetic=settings
-            ).search
-            assert found is not None
-            fitness[row, column], used[row, column] = found.value, found.evaluations
-            if progress is not None:
-                progress(row * len(seeds) + column + 1, fitness.size)
-    return MethodComparison(tuple(methods), tuple(seeds), fitness, used)
+    if not largest_size > 0.0:
+        raise refused("largest_size", largest_size, "a length above 0 m is needed")
+
+    def objective(points: Array) -> Array:
+        needed = problem.needed_pressure(points)
+        if not math.isfinite(largest_size):
+            return needed
+        excess = problem.size(points) / largest_size - 1.0
+        return np.where(excess > 0.0, 3e10 * (1.0 + excess), needed)
+
+    lengths, pressure, used = _smallest(objective, problem, evaluations, seed, progress)
+    if pressure < 1e10:
+        return JointDesign(problem.replace(pressure=pressure), lengths, used)
+    return None
+
+
+def _smallest(
+    objective: Callable[[Array], Array],
+    problem: JointProblem,
+    evaluations: int,
+    seed: int,
+    progress: Progress | None,
+) -> tuple[Array, float, int]:
+    """Lengths in the problem's bounds (4,) with the smallest objective of points (n, 4), that
+    objective, and how many were tried.
+    """
+    from scipy.optimize import Bounds, differential_evolution
+
+    whole("evaluations", evaluations, _GENERATION)
+    whole("seed", seed)
+    size, rounds, span = len(LENGTHS), -(-evaluations // _GENERATION), problem.upper - problem.lower
+    tried = 0
+
+    def by_columns(columns: Array, /, *_: Any, **__: Any) -> Any:
+        nonlocal tried
+        tried += columns.shape[1]
+        if progress is not None:
+            progress(tried, rounds * _GENERATION)
+        return objective(problem.lower + columns.T * span)
+
+    found = differential_evolution(
+        by_columns,
+        Bounds(np.zeros(size), np.ones(size)),
+        popsize=_GENERATION // size,
+        maxiter=rounds - 1,
+        tol=0.0,
+        atol=-1.0,  # never converged: the evaluations decide
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+        rng=np.random.default_rng(seed),
+    )
+    return problem.lower + found.x * span, float(found.fun), tried

@@ -18,17 +18,24 @@ from pamrs._checks import one_of, positive, whole
 from pamrs.design._filling import Filling
 from pamrs.errors import ParameterError
 from pamrs.library import Entry, entry
-from pamrs.library.evaluate import free_contraction
 from pamrs.units import from_si
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["Candidate", "Filling", "Requirement", "SizingResult", "packed_diameter", "size"]
+__all__ = [
+    "Candidate",
+    "Filling",
+    "Requirement",
+    "SizingResult",
+    "free_contraction",
+    "packed_diameter",
+    "size",
+]
 
 Array = NDArray[np.float64]
 
-_LEAST_PRESSURE: Final = 2e3  # [Pa], below which a working pressure is a mistake of unit
+_LEAST_WORKING_PRESSURE: Final = 2e3  # [Pa], below which a working pressure is a mistake of unit
 _RULES: Final[dict[str, tuple[str, bool]]] = {  # criterion: (key, larger is better)
     "count": ("count", False),
     "mass": ("mass", False),
@@ -180,6 +187,43 @@ def packed_diameter(count: int, diameter: float, core: float = 0.0) -> float:
     touching = diameter / math.sin(math.pi / count) if count > 1 else 0.0
     around = core + diameter if core > 0.0 else 0.0
     return max(touching, around) + diameter
+
+
+def free_contraction(muscle: Muscle, pressure: float) -> float:
+    """Contraction at which the unloaded muscle comes to rest [1].
+
+    Parameters
+    ----------
+    muscle : Muscle
+        The muscle.
+    pressure : float
+        Gauge pressure [Pa], above zero.
+
+    Returns
+    -------
+    float
+        The smallest contraction at which the force is zero, or the braid's limit where the force
+        still pulls there.
+
+    Raises
+    ------
+    ParameterError
+        If the pressure is not finite and positive.
+    """
+    from scipy.optimize import brentq
+
+    positive("pressure", pressure)
+    limit = muscle.contraction_limits[1]
+    grid = np.linspace(0.0, limit, 401)
+    pushing = np.flatnonzero(muscle.force(pressure, grid) <= 0.0)
+    if pushing.size == 0:
+        return float(limit)
+    first = int(pushing[0])
+    if first == 0:
+        return 0.0
+    low, high = float(grid[first - 1]), float(grid[first])
+    found = brentq(lambda e: float(muscle.force(pressure, e)), low, high, xtol=1e-16, rtol=1e-14)
+    return float(found)
 
 
 @dataclass(frozen=True)
@@ -344,7 +388,7 @@ def size(
             reason = str(error)
         if reason:
             hint = ""
-            if candidate.pressure < _LEAST_PRESSURE:
+            if candidate.pressure < _LEAST_WORKING_PRESSURE:
                 hint = f" (its pressure is {candidate.pressure:g} Pa: were bar meant?)"
             infeasible[candidate.name] = reason + hint
     return SizingResult(rows, infeasible)

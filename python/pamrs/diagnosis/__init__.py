@@ -7,10 +7,9 @@ noise level is located by block and condition, and the effects of the catalogue 
 other and with "unlisted" on held-out recordings.
 
 Public are `diagnose`, `Diagnosis`, `DiagnosisSettings`, and these packages and modules, each with
-its own list: `settings` (every number that steers a verdict), `result` and `schema` (what is
-returned), `prove` (many cases, each in a process of its own), `ready` (what is looked at before any
-fit), and the steps in the order in which they work: `prepare`, `fit`, `noise`, `screen`,
-`evidence`, `search`, `model`, `next_experiment`, `explain`.
+its own list: `settings` (what a user may change), `result` (what is returned), `ready` (what is
+looked at before any fit), and the steps in the order in which they work: `prepare`, `fit`, `noise`,
+`screen`, `evidence`, `search`, `model`, `next_experiment`, `explain`.
 """
 
 from __future__ import annotations

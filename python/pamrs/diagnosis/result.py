@@ -16,7 +16,6 @@ from pamrs import __version__, report
 from pamrs._views import COLOURS, Panels, View
 from pamrs._writing import write_atomically
 from pamrs.channels import laboratory_unit
-from pamrs.declared import DEFINITIONS, document, object_of, told
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError
 from pamrs.findings import VERDICTS, Findings, ModelFile, Trace, fields_from, to_plain
@@ -31,11 +30,10 @@ __all__ = [
     "ModelFile",
     "Trace",
     "load_result",
-    "schema",
 ]
 
 SCHEMA: Final = "pamrs.diagnosis/2"
-"""Name of the JSON schema that `Diagnosis.to_json` follows."""
+"""Name and number of what `Diagnosis.to_json` writes."""
 READABLE: Final = ("pamrs.diagnosis/1", SCHEMA)
 """Schemas of results that can be read: every key of an earlier one has kept its meaning."""
 
@@ -161,10 +159,12 @@ class Diagnosis(View, Findings):
         If `verdict` is none of the allowed ones.
     """
 
-    settings: DiagnosisSettings = field(
-        default_factory=DiagnosisSettings,
-        metadata=told("the settings that differ from the defaults of `version`"),
-    )
+    settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
+
+    @property
+    def settled(self) -> float:
+        """Probability from which its answers are settled, as its settings have it."""
+        return self.settings.settled
 
     @property
     def headline(self) -> str:
@@ -172,9 +172,7 @@ class Diagnosis(View, Findings):
         return story.headline(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the content of the JSON file: exactly the keys of the schema, null for no
-        number.
-        """
+        """Return the content of the JSON file: null for no number."""
         own = [
             f.name
             for f in dataclasses.fields(self)
@@ -347,24 +345,3 @@ def load_result(path: str | os.PathLike[str]) -> Diagnosis:
         return _Read(**values, settings=DiagnosisSettings.from_dict(settings))
     except (TypeError, ValueError, AttributeError) as error:
         raise DiagnosisError(f"{file}: is no complete result ({error})") from None
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of `pamrs.diagnosis/2` as a dictionary, made from the types of the
-    result.
-    """
-    definitions = dict(DEFINITIONS)
-    found = object_of(Diagnosis, definitions)
-    own = {
-        "required": ["schema", *found["required"], "version"],
-        "properties": {
-            "schema": {"const": SCHEMA},
-            **found["properties"],
-            "version": {"description": "version of pamrs that wrote it", "type": "string"},
-        },
-    }
-    about = (
-        "Result of a diagnosis: which physics the simulation of a rig leaves out. All quantities "
-        "in SI; null where the data give no number."
-    )
-    return document(SCHEMA, about, found | own, definitions)

@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from pamrs._checks import checked_table
-from pamrs.declared import told
 from pamrs.errors import ParameterError
+from pamrs.findings import SETTLED
 
 __all__ = ["DiagnosisSettings"]
 
@@ -25,7 +25,7 @@ def _setting(
     default: float, unit: str, reason: str, origin: str, least: float = 0.0, most: float = math.inf
 ) -> Any:
     """One setting: default, SI unit (``count``: a whole number), why, from where, its range."""
-    meta = told(reason, unit=unit, origin=origin, least=least, most=most, required=False)
+    meta = {"about": reason, "unit": unit, "origin": origin, "least": least, "most": most}
     return dataclasses.field(default=default, metadata=meta)
 
 
@@ -276,7 +276,7 @@ class DiagnosisSettings:
     )
     # from probabilities to a verdict
     settled: float = _setting(
-        0.75,
+        SETTLED,
         "1",
         "probability from which an answer is settled",
         "docs/decisions/0014: odds of three to one",

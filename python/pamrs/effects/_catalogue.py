@@ -49,7 +49,7 @@ def _same_data(told: dict[str, Any], words: dict[str, Any]) -> SameData:
 
 
 #: Of an effect, as the core tells it.
-_TOLD: Final = ("block", "at", "last_only", "on_loads", "frees_mass", "dry_friction")
+_OF_CORE: Final = ("block", "at", "last_only", "on_loads", "frees_mass", "dry_friction")
 
 
 def _info(told: dict[str, Any]) -> EffectInfo:
@@ -86,7 +86,7 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         stated_by=tuple(words.get("stated_by", ())),
         like_values=tuple(words.get("like_values", ())),
         bench_units=tuple(BenchUnit(**unit) for unit in words.get("bench_units", ())),
-        **{key: told[key] for key in _TOLD},
+        **{key: told[key] for key in _OF_CORE},
         **{key: words[key] for key in ("name", "equation", "fingerprint", "separates")},
         **{key: words.get(key, "") for key in ("label", "experiment", "shares", "bench")},
     )

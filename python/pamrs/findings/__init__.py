@@ -4,9 +4,9 @@ Entries have attributes and can be read like dictionaries. This package computes
 below reports and diagnosis, so that neither has to know the other to name what lies between them.
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
-`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
-`channels_off` (of free runs); `compare_results` of two results, and `Compared`; `to_plain`, by
-which they become JSON, and `fields_from`, which reads it.
+`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`,
+`SETTLED`; `channels_off` (of free runs); `compare_results` of two results, and `Compared`;
+`to_plain`, by which they become JSON, and `fields_from`, which reads it.
 """
 
 from __future__ import annotations
@@ -50,12 +50,13 @@ from pamrs.findings._entries import (
     WrongParameter,
 )
 from pamrs.findings._entry import Entry, fields_from, to_plain
-from pamrs.findings._findings import Findings, channels_off
+from pamrs.findings._findings import SETTLED, Findings, channels_off
 from pamrs.findings._trace import ModelFile, Trace
 
 __all__ = [
     "HEALTHY",
     "NOT_JUDGED",
+    "SETTLED",
     "VERDICTS",
     "BlockMismatch",
     "BlockResidual",

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pamrs.declared import told
-from pamrs.findings._entry import Entry
+from pamrs.findings._entry import NOT_WRITTEN, Entry
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -72,7 +71,7 @@ class Curves(Entry):
     channel: str
     unit: str
     time: FloatArray
-    predicted: Mapping[str, FloatArray] = field(metadata=told(key="values"))
+    predicted: Mapping[str, FloatArray] = field(metadata={"key": "values"})
     leading: str
     bin_time: FloatArray
     left: Mapping[str, FloatArray]
@@ -195,10 +194,10 @@ class NextExperiment(Entry):
     text: str = ""
     excitation: dict[str, Any] = field(default_factory=dict)
     expected_information_bits: float | None = None
-    ranking: list[RankedExperiment] = field(default_factory=list, metadata=told(json=False))
-    curves: Curves | None = field(default=None, metadata=told(json=False))
+    ranking: list[RankedExperiment] = field(default_factory=list, metadata=NOT_WRITTEN)
+    curves: Curves | None = field(default=None, metadata=NOT_WRITTEN)
     pairs: list[PairExperiment] = field(default_factory=list)
-    protocol: Protocol | None = field(default=None, metadata=told(json=False))
+    protocol: Protocol | None = field(default=None, metadata=NOT_WRITTEN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,7 +254,7 @@ class Tried(Entry):
     held_out: dict[str, float]
     gap_closed: float
     scatter: float
-    fitted_values: dict[str, float] = field(metadata=told(key="values"))
+    fitted_values: dict[str, float] = field(metadata={"key": "values"})
     std: dict[str, float]
     prior: float
     suspects: list[str]
@@ -319,18 +318,10 @@ class Considered(Entry):
         or where the model cannot be run with it.
     """
 
-    names: list[str] = field(metadata=told("effects, and parameters that may be wrong"))
-    blocks: list[str] = field(
-        metadata=told("where they act; none where no such block keeps more than noise")
-    )
-    probability: float = field(metadata=told("that this is what is missing there"))
-    left: float | None = field(
-        metadata=told(
-            "share of the mismatch that it leaves; null where nothing is missing, where a "
-            "parameter of it stays inside its tolerances, where it would happen with another "
-            "event or a wrong value, or where the model cannot be run with it"
-        )
-    )
+    names: list[str]
+    blocks: list[str]
+    probability: float
+    left: float | None
 
 
 @dataclass(frozen=True, eq=False)

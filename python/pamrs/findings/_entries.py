@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from pamrs.declared import told
-from pamrs.findings._entry import Entry
+from pamrs.findings._entry import NOT_WRITTEN, OMIT_EMPTY, OPTIONAL, Entry
 
 VERDICTS: Final = ("none", "parameters", "effects", "unlisted", "units")
 """Allowed verdicts."""
@@ -61,24 +60,13 @@ class Where(Entry):
         Recording to which the intervals belong.
     """
 
-    block: str | None = field(
-        default=None, metadata=told("block of the chain that carries the excess residual")
-    )
-    channel: str | None = field(default=None, metadata=told("channel that tells"))
-    probability: float | None = field(
-        default=None,
-        metadata=told(
-            "probability that something is missing or wrong there, whatever its name", optional=True
-        ),
-    )
-    intervals: list[list[float]] = field(
-        default_factory=list, metadata=told("start and stop in s", kind="pairs")
-    )
-    conditions: list[Condition] = field(
-        default_factory=list, metadata=told("operating conditions that carry the excess")
-    )
+    block: str | None = None
+    channel: str | None = None
+    probability: float | None = field(default=None, metadata=OPTIONAL)
+    intervals: list[list[float]] = field(default_factory=list)
+    conditions: list[Condition] = field(default_factory=list)
     text: str = ""
-    recording: str | None = field(default=None, metadata=told(json=False, optional=True))
+    recording: str | None = field(default=None, metadata=NOT_WRITTEN | OPTIONAL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +91,8 @@ class EffectParameterFound(Entry):
     value: float
     std: float | None
     unit: str
-    interval: list[float] | None = field(
-        default=None, metadata=told("95 % interval", optional=True, kind="pair")
-    )
-    identifiable: bool | None = field(default=None, metadata=told(optional=True))
+    interval: list[float] | None = field(default=None, metadata=OPTIONAL)
+    identifiable: bool | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,26 +117,13 @@ class EffectFound(Entry):
         parameters, SI.
     """
 
-    id: str = field(metadata=told(least_length=1))
-    name: str = field(default="", metadata=told("what it is called", required=False))
-    at: str = field(
-        default="",
-        metadata=told(
-            "block at which the effect acts, where the rig has several of its kind; every one "
-            "where it is left out",
-            omit_empty=True,
-        ),
-    )
-    form: str = field(
-        default="",
-        metadata=told("form of the effect's equation, where it is not the usual", omit_empty=True),
-    )
-    probability: float = field(default=math.nan, metadata=told(kind="probability"))
+    id: str
+    name: str = ""
+    at: str = ""
+    form: str = ""
+    probability: float = math.nan
     parameters: dict[str, EffectParameterFound] = field(default_factory=dict)
-    events: list[dict[str, Any]] = field(
-        default_factory=list,
-        metadata=told("what happened in single recordings, SI", omit_empty=True, kind="events"),
-    )
+    events: list[dict[str, Any]] = field(default_factory=list, metadata=OMIT_EMPTY)
 
     @property
     def term(self) -> str:
@@ -170,9 +143,9 @@ class MismatchSize(Entry):
         Whether it is more than noise could leave.
     """
 
-    noises: float = field(metadata=told("in units of the noise"))
-    size: float = field(metadata=told("in the unit of the channel"))
-    more_than_noise: bool = field(metadata=told("whether it is more than noise could leave"))
+    noises: float
+    size: float
+    more_than_noise: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,15 +184,8 @@ class BlockMismatch(Entry):
     channel: str
     unit: str
     fitted: MismatchStages
-    held_out: MismatchStages | None = field(metadata=told("null where nothing was held out"))
-    model_error: float = field(
-        default=0.0,
-        metadata=told(
-            "what the error that is taken for the model's own does to the channel, one standard "
-            "deviation",
-            required=False,
-        ),
-    )
+    held_out: MismatchStages | None
+    model_error: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,27 +213,15 @@ class BlockVerdict(Entry):
         Why it is not judged; empty where it is.
     """
 
-    blocks: list[str] = field(metadata=told("names of its blocks"))
-    verdict: str = field(metadata=told(enum=(*VERDICTS, NOT_JUDGED)))
-    probabilities: dict[str, float] = field(
-        metadata=told(
-            "over its hypotheses: effects by id, wrong parameters by dotted name, sets joined by +",
-            kind="probability",
-        )
-    )
-    effects: list[str] = field(metadata=told("ids that are named"))
-    wrong_parameters: list[str] = field(metadata=told("parameters that are named"))
+    blocks: list[str]
+    verdict: str
+    probabilities: dict[str, float]
+    effects: list[str]
+    wrong_parameters: list[str]
     ambiguity: list[list[str]]
     mismatch: list[BlockMismatch] = field(default_factory=list)
-    covers: str = field(
-        default="",
-        metadata=told(
-            "of a block that is not judged: what of the rig it stands for", required=False
-        ),
-    )
-    reason: str = field(
-        default="", metadata=told("why it is not judged; empty where it is", required=False)
-    )
+    covers: str = ""
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,32 +253,14 @@ class Unexplained(Entry):
     block: str
     channel: str
     unit: str
-    noises: float = field(metadata=told("in units of the noise"))
-    size: float = field(metadata=told("in the unit of the channel"))
-    verdict: str = field(metadata=told("of its group of blocks", enum=VERDICTS[1:]))
-    share: float | None = field(
-        default=None, metadata=told("of the nominal model's excess variance over the noise")
-    )
-    interval: list[float] | None = field(
-        default=None, metadata=told("95 % interval of the share", kind="pair_or_null")
-    )
-    conditions: list[Condition] = field(
-        default_factory=list, metadata=told("under which it is largest, the most significant first")
-    )
-    form: str = field(
-        default="",
-        metadata=told(
-            "what it is a function of, in words, where that carries over to other recordings"
-        ),
-    )
-    role: str = field(
-        default="",
-        metadata=told("of the recordings that its size is of: held_out or fit", required=False),
-    )
-
-
-TERMS = ("held", "parameters", "wrong_parameter", "effect", "form", "unexplained")
-"""Kinds of the terms of a budget."""
+    noises: float
+    size: float
+    verdict: str
+    share: float | None = None
+    interval: list[float] | None = None
+    conditions: list[Condition] = field(default_factory=list)
+    form: str = ""
+    role: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,28 +300,17 @@ class BudgetTerm(Entry):
     """
 
     block: str
-    kind: str = field(metadata=told(enum=TERMS))
+    kind: str
     id: str
     form: str
-    share: float = field(
-        metadata=told(
-            "of the nominal model's excess variance over the noise: what parameters "
-            "take by themselves, then what names take beyond them, divided among these"
-        )
-    )
-    interval: list[float] = field(metadata=told("95 % interval of the share", kind="pair"))
-    probability: float | None = field(metadata=told("of the name", kind="probability"))
-    noises: float = field(metadata=told("what the block keeps after it, in units of the noise"))
-    size: float = field(metadata=told("the same in the unit of the channel"))
+    share: float
+    interval: list[float]
+    probability: float | None
+    noises: float
+    size: float
     unit: str
-    at: str = field(
-        default="",
-        metadata=told("block at which the effect acts; empty for every block of its kind"),
-    )
-    parameters: dict[str, EffectParameterFound] = field(
-        default_factory=dict,
-        metadata=told("values of the effect, or of the wrong parameters by dotted name"),
-    )
+    at: str = ""
+    parameters: dict[str, EffectParameterFound] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -415,10 +340,10 @@ class ChannelError(Entry):
         Error of the nominal model, after refitting parameters only, and with what was found.
     """
 
-    noise: float = field(metadata=told("standard deviation of the sensor noise"))
-    before: float = field(metadata=told("root mean square error of the nominal model"))
-    refit: float = field(metadata=told("root mean square error after refitting parameters only"))
-    after: float = field(metadata=told("root mean square error with the effect"))
+    noise: float
+    before: float
+    refit: float
+    after: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -448,13 +373,13 @@ class Misread(Entry):
     channels: list[str]
     said: str
     likely: str
-    factors: list[float] = field(metadata=told("by which the values of each are to be multiplied"))
-    offset: float = field(metadata=told("what is to be added to them then, SI"))
-    before: float = field(metadata=told("what the baseline leaves, in variances of the noise"))
-    after: float = field(metadata=told("the same with the channels read so"))
+    factors: list[float]
+    offset: float
+    before: float
+    after: float
     text: str
-    gain: float = field(default=math.nan, metadata=told(json=False))
-    std: float = field(default=math.nan, metadata=told(json=False))
+    gain: float = field(default=math.nan, metadata=NOT_WRITTEN)
+    std: float = field(default=math.nan, metadata=NOT_WRITTEN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -473,7 +398,7 @@ class Faulty(Entry):
     """
 
     channel: str
-    kind: str = field(metadata=told(enum=("clipped", "not_logged")))
+    kind: str
     text: str
 
 
@@ -505,20 +430,15 @@ class WrongParameter(Entry):
 
     name: str
     block: str | None
-    nominal: float = field(metadata=told("value in the rig file"))
-    tolerance: float = field(metadata=told("one standard deviation, by the rig file"))
-    value: float = field(metadata=told("value that the recordings ask for"))
+    nominal: float
+    tolerance: float
+    value: float
     std: float
-    interval: list[float] = field(metadata=told("95 %", kind="pair"))
+    interval: list[float]
     unit: str
-    moved_sigmas: float = field(metadata=told("distance of the two in tolerances"))
-    probability: float = field(metadata=told(kind="probability"))
-    held_out: dict[str, StageError] = field(
-        metadata=told(
-            "root mean square error of each channel it acts on: nominal model, refitted inside the "
-            "tolerances, with the other value"
-        )
-    )
+    moved_sigmas: float
+    probability: float
+    held_out: dict[str, StageError]
 
 
 @dataclass(frozen=True, eq=False)
@@ -542,7 +462,7 @@ class ParameterFound(Entry):
     std: float
     unit: str
     moved_sigmas: float
-    identifiable: bool | None = field(default=None, metadata=told(optional=True))
+    identifiable: bool | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -560,13 +480,7 @@ class FitErrors(Entry):
 
     channels: dict[str, ChannelError] = field(default_factory=dict)
     held_out: dict[str, ChannelError] = field(default_factory=dict)
-    gap_closed: float | None = field(
-        default=None,
-        metadata=told(
-            "(refit - after)/(refit - noise), held-out data, channels pooled in units of their "
-            "noise; 1 is down to the noise"
-        ),
-    )
+    gap_closed: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -590,21 +504,12 @@ class FreeRunError(Entry):
     """
 
     unit: str
-    before: float = field(metadata=told("nominal model, driven by its commands alone"))
-    after: float = field(metadata=told("with what was found, driven by its commands alone"))
-    cut_before: float | None = field(metadata=told("nominal block, driven by what was measured"))
-    cut_after: float | None = field(metadata=told("the same with what was found"))
-    noise: float | None = field(
-        default=None, metadata=told("sample noise of the channel", required=False)
-    )
-    off: bool = field(
-        default=False,
-        metadata=told(
-            "whether the whole rig with what was found misses the channel by many noise levels, "
-            "and by more than its values, as far as they are known, explain",
-            required=False,
-        ),
-    )
+    before: float
+    after: float
+    cut_before: float | None
+    cut_after: float | None
+    noise: float | None = None
+    off: bool = False
 
     @property
     def noises(self) -> float:
@@ -635,9 +540,7 @@ class FreeRun(Entry):
     """
 
     recording: str
-    role: str = field(metadata=told(enum=("fit", "held_out")))
-    seconds: float = field(metadata=told("length of the recording"))
+    role: str
+    seconds: float
     channels: dict[str, FreeRunError]
-    note: str = field(
-        default="", metadata=told("why a model gives no numbers; empty where both do")
-    )
+    note: str = ""

@@ -7,14 +7,22 @@ import math
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+
+NOT_WRITTEN: Final = {"json": False}
+"""Metadata of a field that JSON has not."""
+OPTIONAL: Final = {"optional": True}
+"""Metadata of a field whose key is absent where it is None."""
+OMIT_EMPTY: Final = {"omit_empty": True}
+"""Metadata of a list that JSON leaves out where it is empty."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Entry(Mapping[str, Any]):
-    """Part of a result: attributes with types, readable by key as well.
+    """Part of a result: attributes with types, readable by key as well. A field whose key is not
+    its name has it as ``key`` in its metadata.
 
     ``entry["block"]``, ``entry.get("block")`` and ``entry.keys()`` say the same as
     ``entry.block``; two entries are equal when their keys and values are, and so are an entry and
@@ -76,7 +84,7 @@ def _entry(entry: Entry) -> dict[str, Any]:
     for field in dataclasses.fields(entry):
         value, meta = getattr(entry, field.name), field.metadata
         absent = meta.get("optional") and value is None
-        empty = meta.get("omit_empty") and (value is None or value == [])
+        empty = meta.get("omit_empty") and value == []
         if meta.get("json", True) and not absent and not empty:
             found[meta.get("key") or field.name] = to_plain(value)
     if "unit" in found:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
-from pamrs.declared import told
 from pamrs.findings._details import (
     BlockResidual,
     Considered,
@@ -30,7 +30,11 @@ from pamrs.findings._entries import (
     Where,
     WrongParameter,
 )
+from pamrs.findings._entry import NOT_WRITTEN
 from pamrs.findings._trace import ModelFile, Trace
+
+SETTLED: Final = 0.75
+"""Probability from which an answer is settled, where no setting says another one."""
 
 
 def channels_off(runs: Sequence[FreeRun]) -> dict[str, FreeRunError]:
@@ -127,97 +131,46 @@ class Findings:
         If `verdict` is none of the allowed ones.
     """
 
-    case: str = field(metadata=told("name of the case", required=False))
-    verdict: str = field(metadata=told(enum=VERDICTS))
-    misread: list[Misread] = field(
-        default_factory=list,
-        metadata=told(
-            "channels that are likely in another unit than the log says, judged before any physics",
-            required=False,
-        ),
-    )
-    faulty: list[Faulty] = field(
-        default_factory=list,
-        metadata=told(
-            "channels that a sensor or logger spoiled: masked or left out, and said first",
-            required=False,
-        ),
-    )
+    case: str
+    verdict: str
+    misread: list[Misread] = field(default_factory=list)
+    faulty: list[Faulty] = field(default_factory=list)
     where: Where = field(default_factory=Where)
-    effects: list[EffectFound] = field(
-        default_factory=list, metadata=told("the named physics, most probable first")
-    )
-    ambiguity: list[list[str]] = field(
-        default_factory=list,
-        metadata=told("sets of effects that the data cannot separate; empty when settled"),
-    )
-    probabilities: dict[str, float] = field(
-        default_factory=dict, metadata=told("over all hypotheses", kind="probability")
-    )
-    blocks: list[BlockVerdict] = field(
-        default_factory=list,
-        metadata=told(
-            "the verdict of each group of blocks that is judged by itself, then blocks that were "
-            "not judged"
-        ),
-    )
-    budget: list[BudgetTerm] = field(
-        default_factory=list,
-        metadata=told(
-            "what of the nominal model's excess over the noise each term takes, block by block"
-        ),
-    )
-    unexplained: list[Unexplained] = field(
-        default_factory=list,
-        metadata=told("blocks with a mismatch that stays unexplained, the largest first"),
-    )
-    wrong_parameters: list[WrongParameter] = field(
-        default_factory=list,
-        metadata=told("values of the rig file that are wrong"),
-    )
-    free_run: list[FreeRun] | None = field(
-        default=None,
-        metadata=told(
-            "the whole rig simulated from its commands alone, by held-out recording (by fitted "
-            "one where none was held out); null where no recording has the commands"
-        ),
-    )
-    free_run_note: str = field(
-        default="",
-        metadata=told("why there is no free run, or of some recordings none; empty otherwise"),
-    )
+    effects: list[EffectFound] = field(default_factory=list)
+    ambiguity: list[list[str]] = field(default_factory=list)
+    probabilities: dict[str, float] = field(default_factory=dict)
+    blocks: list[BlockVerdict] = field(default_factory=list)
+    budget: list[BudgetTerm] = field(default_factory=list)
+    unexplained: list[Unexplained] = field(default_factory=list)
+    wrong_parameters: list[WrongParameter] = field(default_factory=list)
+    free_run: list[FreeRun] | None = None
+    free_run_note: str = ""
     parameters: dict[str, ParameterFound] = field(default_factory=dict)
     fit: FitErrors = field(default_factory=FitErrors)
     next_experiment: NextExperiment = field(default_factory=NextExperiment)
-    data: list[RecordingUsed] = field(
-        default_factory=list,
-        metadata=told(
-            "what of each recording the answer rests on, and which channels were not used"
-        ),
-    )
-    considered: list[Considered] = field(
-        default_factory=list,
-        metadata=told("what the caller asked to be judged in addition", required=False),
-    )
-    inputs: dict[str, str] = field(
-        default_factory=dict,
-        metadata=told("SHA-256 of each file that the case was read from", required=False),
-    )
+    data: list[RecordingUsed] = field(default_factory=list)
+    considered: list[Considered] = field(default_factory=list)
+    inputs: dict[str, str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0
-    text: str = field(default="", metadata=told("the verdict in words", required=False))
-    rig: ModelFile | None = field(default=None, metadata=told(json=False))
-    traces: list[Trace] = field(default_factory=list, metadata=told(json=False))
-    free_traces: list[Trace] = field(default_factory=list, metadata=told(json=False))
-    measured: list[str] = field(default_factory=list, metadata=told(json=False))
-    residuals: dict[str, BlockResidual] = field(default_factory=dict, metadata=told(json=False))
-    timings: dict[str, float] = field(default_factory=dict, metadata=told(json=False))
-    tried: list[Tried] = field(default_factory=list, metadata=told(json=False))
-    tested: list[Tested] = field(default_factory=list, metadata=told(json=False))
+    text: str = ""
+    rig: ModelFile | None = field(default=None, metadata=NOT_WRITTEN)
+    traces: list[Trace] = field(default_factory=list, metadata=NOT_WRITTEN)
+    free_traces: list[Trace] = field(default_factory=list, metadata=NOT_WRITTEN)
+    measured: list[str] = field(default_factory=list, metadata=NOT_WRITTEN)
+    residuals: dict[str, BlockResidual] = field(default_factory=dict, metadata=NOT_WRITTEN)
+    timings: dict[str, float] = field(default_factory=dict, metadata=NOT_WRITTEN)
+    tried: list[Tried] = field(default_factory=list, metadata=NOT_WRITTEN)
+    tested: list[Tested] = field(default_factory=list, metadata=NOT_WRITTEN)
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
             raise ValueError(f"verdict is {self.verdict!r}; allowed are {', '.join(VERDICTS)}")
+
+    @property
+    def settled(self) -> float:
+        """Probability from which an answer is settled."""
+        return SETTLED
 
     @property
     def off(self) -> dict[str, FreeRunError]:

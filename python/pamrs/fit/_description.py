@@ -8,26 +8,26 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from pamrs._files import is_inside, toml_document
-from pamrs.declared import BOOLEAN, NUMBER, TEXT, Rule, problems_of
+from pamrs.declared import Rule, holds, is_finite, is_text, problems_of
 from pamrs.errors import RecordingError, joined
 from pamrs.rig import Muscle, Reader, muscle_problems
 from pamrs.rig.muscle_models import models_with
 
 SCHEMA: Final = "pamrs.force_map/1"
-_ENTRY: Final = {"anyOf": [TEXT, {"type": "object"}]}
-_LIST: Final = {"type": "array", "items": _ENTRY}
-_CELL: Final = {"anyOf": [TEXT, NUMBER, BOOLEAN]}
 _TOP: Final = {
-    "schema": Rule({"const": SCHEMA}, repr(SCHEMA)),
+    "schema": Rule(lambda value: value == SCHEMA, repr(SCHEMA)),
     **dict.fromkeys(
-        ("name", "description", "source", "file", "delimiter", "decimal"), Rule(TEXT, "a text")
+        ("name", "description", "source", "file", "delimiter", "decimal"), Rule(is_text, "a text")
     ),
     "columns": Rule(
-        {"anyOf": [{"type": "object", "additionalProperties": _ENTRY}, _LIST]},
+        holds((list, Mapping), lambda value: isinstance(value, (str, Mapping))),
         "a table of texts, or a list of one for each column",
     ),
-    "where": Rule({"type": "object", "additionalProperties": _CELL}, "a table of texts"),
-    **dict.fromkeys(("clipped_force", "level_tolerance", "noise", "muscle"), Rule({}, "")),
+    "where": Rule(
+        holds(Mapping, lambda value: isinstance(value, (str, bool)) or is_finite(value)),
+        "a table of texts",
+    ),
+    **dict.fromkeys(("clipped_force", "level_tolerance", "noise", "muscle"), Rule(None, "")),
 }
 
 #: Moduli of a muscle whose moduli a fit is to find, in the order that it takes unless told
@@ -105,7 +105,7 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
         reader.problem("the block [muscle] is missing: the muscle's geometry, as in a rig file")
     if reader.problems:
         raise RecordingError(joined(str(file), reader.problems))
-    texts = {key: document.get(key, "") for key, rule in _TOP.items() if rule.schema == TEXT}
+    texts = {key: document.get(key, "") for key, rule in _TOP.items() if rule.accepts is is_text}
     where = {key: str(value) for key, value in document.get("where", {}).items()}
     table = Path(os.path.normpath(file.parent / texts["file"]))
     if not (allow_outside or "\0" in texts["file"] or is_inside(file.parent, table)):

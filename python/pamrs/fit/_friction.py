@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs._checks import refused
-from pamrs._views import Panels, View
+from pamrs._views import COLOURS, Panels, View
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.findings import to_plain
 from pamrs.fit._data import ForceMap
@@ -48,7 +47,7 @@ _OF_A_LEVEL: Final = (
     *("pressure", "coefficient", "stderr", "law", "at_floor", "rows"),
     *("contraction", "force", "half_width"),
 )
-_TOLD: Final = (
+_OF_A_FIT: Final = (
     *("parameters", "floor", "presliding", "presliding_reason", "levels", "residual", "ndata"),
     *("nvarys", "nfree", "redchi", "between", "covar", "slope_pvalue", "slope_significant"),
     *("isometric", "issues"),
@@ -150,9 +149,21 @@ class FrictionFit(View):
         return f"FrictionFit(c_F = {law}, {len(self.levels)} levels)"
 
     def _panels(self) -> Panels:
-        from pamrs.fit._friction_figure import draw_law
+        return {"coefficient": self._draw}
 
-        return {"coefficient": partial(draw_law, fit=self)}
+    def _draw(self, axes: Any) -> None:
+        """Coefficient of each level with two standard errors, and the law."""
+        pressure, value, error = _columns(self.levels)
+        grid = np.linspace(0.0, 1.08 * float(pressure.max()), 200)
+        axes.plot(grid / 1e3, self.predict(grid), color=COLOURS[0], lw=1.6, label="law")
+        style: dict[str, Any] = {"fmt": "o", "ms": 5, "color": COLOURS[1], "lw": 0.9}
+        axes.errorbar(pressure / 1e3, value, 2.0 * error, label="each level, ± 2 s.e.", **style)
+        axes.axhline(self.floor, color="0.4", lw=0.8, ls=(0, (1, 2)), label="floor")
+        axes.set_xlim(0.0, grid[-1] / 1e3)
+        axes.set_ylim(bottom=min(0.0, 1.1 * float(np.min(value - 2.0 * error))))
+        axes.set_xlabel("pressure [kPa]")
+        axes.set_ylabel("friction coefficient [1]")
+        axes.legend(loc="best")
 
     def _numbers(self) -> dict[str, str]:
         c0, c1 = self._law()
@@ -270,7 +281,7 @@ class FrictionFit(View):
             for level, law in zip(self.levels, self.best_fit.tolist(), strict=True)
         ]
         own = {"parameters": [asdict(item) for item in self.params.values()], "levels": levels}
-        plain = {key: own[key] if key in own else getattr(self, key) for key in _TOLD}
+        plain = {key: own[key] if key in own else getattr(self, key) for key in _OF_A_FIT}
         found: dict[str, Any] = to_plain(plain)
         return found
 

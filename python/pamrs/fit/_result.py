@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs._checks import contraction_of, matched, one_of, quantities
 from pamrs._views import Panels, View
+from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError
 from pamrs.fit._design import friction_factor
 from pamrs.fit._estimate import geometry_slopes
@@ -22,7 +22,6 @@ from pamrs.fit._validation import CrossValidation, PressureErrors, leave_one_out
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
-    from pamrs.fit._compare import ModelComparison
     from pamrs.fit._data import ForceMap
     from pamrs.rig import Muscle, Rig
 
@@ -40,12 +39,6 @@ class MuscleFit(View, FitStatistics):
     It has the numbers of the fit (:class:`pamrs.fit._statistics.FitStatistics`), errors by pressure
     and on pressures left out, and it predicts.
     """
-
-    _fit: Callable[..., MuscleFit] = field(repr=False)
-
-    def refitted(self, muscle: Muscle, **options: Any) -> MuscleFit:
-        """The same map fitted in another way; arguments as those of :func:`fit_muscle`."""
-        return self._fit(self.data, muscle, **options)
 
     def _panels(self) -> Panels:
         return {"force": self._draw}
@@ -347,47 +340,11 @@ class MuscleFit(View, FitStatistics):
 
         return to_dict(self)
 
-    def report(
-        self, path: str | os.PathLike[str], comparison: ModelComparison | None = None
-    ) -> Path:
-        """Write the report, one HTML file that needs no network.
+    def figure(self, path: str | os.PathLike[str]) -> Path:
+        """Write one picture of the fit, a PNG of 1600 x 1000 pixels, and return its path."""
+        from pamrs.fit._figures import summary_png
 
-        Parameters
-        ----------
-        path : path-like
-            The file.
-        comparison : ModelComparison, optional
-            Models to show beside the fit, from :func:`pamrs.fit.compare_models`.
-
-        Returns
-        -------
-        Path
-            The file written.
-        """
-        from pamrs.fit.report import write_report
-
-        return write_report(self, path, comparison)
-
-    def figure(
-        self, path: str | os.PathLike[str], comparison: ModelComparison | None = None
-    ) -> Path:
-        """Write one picture of the fit, a PNG of 1600 x 1000 pixels; arguments as :meth:`report`.
-
-        Parameters
-        ----------
-        path : path-like
-            The file.
-        comparison : ModelComparison, optional
-            Models to show beside the fit.
-
-        Returns
-        -------
-        Path
-            The file written.
-        """
-        from pamrs.fit.report import write_figure
-
-        return write_figure(self, path, comparison)
+        return write_atomically(path, summary_png(self))
 
     def fit_report(self) -> str:
         """The fit in words and numbers, for a terminal."""

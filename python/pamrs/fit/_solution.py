@@ -335,7 +335,6 @@ def _result(
         _problem=problem,
         _estimate=found,
         _rows=rows,
-        _fit=fit_muscle,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,14 +106,6 @@ class FitStatistics:
     def free(self) -> tuple[Free, ...]:
         """The geometry that was fitted: name, nominal value, tolerance."""
         return self._problem.free
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """How the rows were used: ``weights``, ``direction`` and ``noise`` of
-        :func:`pamrs.fit.fit_muscle`.
-        """
-        direction = "data" if np.any(self._problem.direction) else None
-        return {"weights": self.weights, "direction": direction, "noise": self.stated_noise}
 
     @property
     def moduli_names(self) -> tuple[str, ...]:

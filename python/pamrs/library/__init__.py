@@ -1,10 +1,8 @@
-"""The muscles of the 2014 dissertation: geometry, moduli, published facts, and where each number
-comes from.
+"""The muscles of the 2014 dissertation: geometry, moduli, and where each number comes from.
 
 ``pamrs.library.elbow_0625in()`` is a :class:`pamrs.Muscle`; ``pamrs.library.entry("elbow_0625in")``
-also has the origin of each number, the mass, the highest pressure and the published facts.
-``python -m pamrs.library`` derives the identified numbers again and prints every fact beside what
-the muscle gives.
+also has the origin of each number, the mass and the highest pressure. What is published about the
+muscles stands beside what they give in the reproduction of the dissertation.
 """
 
 from __future__ import annotations
@@ -14,14 +12,13 @@ from importlib import resources
 from typing import TYPE_CHECKING, Final
 
 from pamrs.errors import ParameterError, meant
-from pamrs.library._entry import Entry, Fact, quantity, read_entry
+from pamrs.library._entry import Entry, quantity, read_entry
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
 __all__ = [
     "Entry",
-    "Fact",
     "ch2_075in",
     "elbow_0625in",
     "entry",
@@ -31,7 +28,6 @@ __all__ = [
     "pam_a_1in",
     "pam_b_075in",
     "quantity",
-    "read_entry",
 ]
 
 _NAMES: Final = (
@@ -51,7 +47,7 @@ def names() -> list[str]:
 
 @cache
 def entry(name: str) -> Entry:
-    """What the library knows about one muscle.
+    """A muscle and what is known of it.
 
     Parameters
     ----------
@@ -70,7 +66,7 @@ def entry(name: str) -> Entry:
     if name not in _NAMES:
         raise ParameterError(f"name = {name!r} is not in the library; {meant(str(name), _NAMES)}")
     file = resources.files(__name__).joinpath(f"{name}.toml")
-    return read_entry(file.read_text(encoding="utf-8"), source=f"{name}.toml")
+    return read_entry(file.read_text(encoding="utf-8"))
 
 
 def elbow_0625in() -> Muscle:

@@ -1,10 +1,9 @@
 """Recordings of a rig on one clock, and cases: a rig with its recordings in a folder.
 
 :func:`load_recording` reads a table, checks it and masks what cannot be used; :func:`load_case`
-reads a case folder, :func:`case_schema` is the JSON
-schema of its ``case.toml``; :func:`load_recordings` takes the log of a laboratory as it is,
-:func:`propose` says what of it is likely which channel, :func:`suspicions` which units physics
-contradicts.
+reads a case folder, :data:`CASE_KEYS` has the keys of its ``case.toml``;
+:func:`load_recordings` takes the log of a laboratory as it is, :func:`propose` says what of it is
+likely which channel, :func:`suspicions` which units physics contradicts.
 :mod:`pamrs.recordings.table` reads tables of numbers from files, :mod:`pamrs.recordings.logs` logs
 of every format, :mod:`pamrs.recordings.calibration` what their numbers stand for.
 """
@@ -13,7 +12,7 @@ from __future__ import annotations
 
 from pamrs.channels import CHANNELS
 from pamrs.recordings._case import Case, load_case, model_and_case
-from pamrs.recordings._case_keys import case_schema
+from pamrs.recordings._case_keys import CASE_KEYS
 from pamrs.recordings._doubts import Suspicion, suspicions
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
@@ -23,6 +22,7 @@ from pamrs.recordings._proposal import LogProposal, Proposal, propose
 from pamrs.recordings._recording import Issue, OwnValue, Recording
 
 __all__ = [
+    "CASE_KEYS",
     "CHANNELS",
     "Case",
     "Issue",
@@ -31,7 +31,6 @@ __all__ = [
     "Proposal",
     "Recording",
     "Suspicion",
-    "case_schema",
     "channels_of",
     "is_table",
     "load_case",

@@ -352,9 +352,7 @@ def png_bytes(figure: Figure) -> bytes:
 
 
 @contextmanager
-def summary_figure(
-    title: str, letters: int, size: float = 15.0, height: float = 6.25
-) -> Iterator[tuple[Figure, Callable[[], bytes]]]:
+def summary_figure(title: str, letters: int) -> Iterator[tuple[Figure, Callable[[], bytes]]]:
     """A picture of 1600 pixels with a headline, and what gives it as PNG.
 
     Parameters
@@ -363,14 +361,12 @@ def summary_figure(
         The headline.
     letters : int
         In a line of it.
-    size, height : float
-        Of its letters [points] and of the picture [inch].
     """
     with mpl.rc_context(STYLE | _SMALL):
-        figure = Figure(figsize=(10.0, height), dpi=160, layout="constrained")
+        figure = Figure(figsize=(10.0, 6.25), dpi=160, layout="constrained")
         room = {"w_pad": 0.12, "h_pad": 0.06, "wspace": 0.03, "hspace": 0.03}
         figure.get_layout_engine().set(**room)  # type: ignore[union-attr]
-        style: dict[str, Any] = {"fontsize": size, "fontweight": "bold", "color": "#111827"}
+        style: dict[str, Any] = {"fontsize": 15.0, "fontweight": "bold", "color": "#111827"}
         figure.suptitle("\n".join(textwrap.wrap(title, letters)), x=0.012, ha="left", **style)
         yield figure, lambda: png_bytes(figure)
 

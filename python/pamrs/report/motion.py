@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
@@ -21,7 +24,6 @@ from pamrs.report.figures import COLOURS, STYLE, png_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from pamrs.simulation import Simulation
 
@@ -54,27 +56,32 @@ _FAINT: Final = "#9ca3af"
 _OWN: Final = (COLOURS["after"], "#0f766e", "#b45309", "#7c3aed", "#be123c", "#4d7c0f")
 
 
-def channels_png(
+def write_channels(
     result: Simulation,
-    measured: Mapping[str, tuple[Array, Array]] | None = None,
+    path: str | os.PathLike[str],
+    *,
+    recorded: Mapping[str, tuple[Array, Array]] | None = None,
     nominal: Simulation | None = None,
-) -> bytes:
-    """Channels of a simulation over time, a PNG.
+) -> Path:
+    """Write a picture of the channels of a simulation over time, a PNG.
 
     Parameters
     ----------
     result : Simulation
         What :func:`pamrs.simulate` returns.
-    measured : mapping of str to (time, value), optional
+    path : path-like
+        The file.
+    recorded : mapping of str to (time, value), optional
         Recorded channels to draw with them [s, SI].
     nominal : Simulation, optional
         The same run of the rig file, where ``result`` is that of a model that was made of it.
 
     Returns
     -------
-    bytes
+    Path
+        The file written.
     """
-    given = measured or {}
+    given = recorded or {}
     there = [(title, _of(result, heads)) for title, heads in _PANELS]
     there = [panel for panel in there if panel[1]]
     moving = [
@@ -93,7 +100,7 @@ def channels_png(
             if len(axes.lines) > 1:
                 _legend_above(axes)
         rows[-1].set_xlabel("time [s]")
-        return png_bytes(figure)
+        return write_atomically(path, png_bytes(figure))
 
 
 def _draw_channel(
@@ -175,14 +182,16 @@ def _tells(result: Simulation, name: str) -> bool:
     return float(np.ptp(result[name])) > 1e-9 * max(float(np.abs(result[name]).max()), 1e-12)
 
 
-def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Path:
-    """The arm as it moves, an animated GIF of 150 pictures at most.
+def write_animation(
+    result: Simulation, path: str | os.PathLike[str], *, speed: float = 1.0
+) -> Path:
+    """Write the arm as it moves, an animated GIF of 150 pictures at most.
 
     Parameters
     ----------
     result : Simulation
         Of a rig with an arm or a linear load.
-    path : Path
+    path : path-like
         The file.
     speed : float
         Times faster than it happens.
@@ -198,9 +207,6 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
         If the rig has nothing that moves, there are fewer than two samples, or the speed is not a
         finite number above zero.
     """
-    import tempfile
-    from pathlib import Path as File
-
     if not result.under("joint_angle") and "length" not in result:
         raise ParameterError(f"the rig {result.rig.name!r} has no arm and no load to draw")
     if result.time.size < 2:
@@ -223,7 +229,7 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
         axes = figure.subplots()
         scene = _Scene(axes, result, float(figure.get_size_inches()[0]))
         motion = FuncAnimation(figure, scene.draw, frames=frames.tolist(), blit=False)
-        picture = File(folder) / "motion.gif"
+        picture = Path(folder) / "motion.gif"
         # a hair slow: the writer cuts the delay to whole milliseconds
         rate: Any = 100.0 / delay * (1.0 - 1e-9)
         motion.save(picture, writer=PillowWriter(fps=rate))

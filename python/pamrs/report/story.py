@@ -60,7 +60,7 @@ def _answering(diagnosis: Findings) -> list[BlockVerdict]:
         return (
             len(answer) == 1
             and bool(answer[0].terms)
-            and (_chance(diagnosis, block, answer[0]) >= words.SETTLED)
+            and (_chance(diagnosis, block, answer[0]) >= diagnosis.settled)
         )
 
     return sorted(found, key=lambda b: (not settled(b), diagnosis.where.block not in b.blocks))
@@ -182,7 +182,7 @@ def _phrase(diagnosis: Findings, block: BlockVerdict, most: int) -> str:
         return f"The rig file is wrong: {off}"
     chances = {h: _chance(diagnosis, block, h) for h in left if h not in (NONE, PARAMETERS)}
     if left == [UNLISTED]:
-        if not chances[UNLISTED] < words.SETTLED:
+        if not chances[UNLISTED] < diagnosis.settled:
             acts = f"Something acts in the {_place(diagnosis, block)}"
             explains = "that no effect of the catalogue explains"
             return _with_chance(f"{acts} {explains}", chances[UNLISTED])

@@ -45,10 +45,6 @@ TELLING = 0.25
 FARTHEST = 3.0
 """How large an end of a share's interval is still told as a number."""
 
-SETTLED = 0.75
-"""Probability from which physics is said to lie outside the catalogue (that from which an answer is
-settled, `DiagnosisSettings.settled`)."""
-
 BUDGET_NOTE = (
     "Shares are of the variance that the nominal model leaves beyond the noise; all values are "
     "those of the final model. Parameters come first, the rest goes to the names, in proportion "
@@ -651,7 +647,7 @@ def is_open(diagnosis: Findings) -> bool:
     """
     if len(diagnosis.ambiguity) > 1 or diagnosis.off:
         return True
-    return diagnosis.verdict == "unlisted" and leading(diagnosis)[1] < SETTLED
+    return diagnosis.verdict == "unlisted" and leading(diagnosis)[1] < diagnosis.settled
 
 
 def told_apart(sets: list[list[str]], probabilities: Mapping[str, float]) -> str:

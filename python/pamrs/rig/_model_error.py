@@ -31,8 +31,7 @@ ERROR_CHANNELS: Final = {
     "length": "load",
 }
 #: A number and its unit, as a pattern.
-STATED: Final = r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*"
-_TEXT: Final = re.compile(STATED)
+_TEXT: Final = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*")
 
 
 def read_model_error(reader: Reader, raw: Any, model: Mapping[str, Any]) -> dict[str, Any]:

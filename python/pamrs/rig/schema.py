@@ -165,7 +165,7 @@ def _key(block: str, told: dict[str, Any], note: str) -> Key:
     )
 
 
-_TOLD: Final[list[dict[str, Any]]] = json.loads(_core.blocks())
+_CORE_BLOCKS: Final[list[dict[str, Any]]] = json.loads(_core.blocks())
 _WORDS: Final[dict[str, dict[str, Any]]] = tomllib.loads(
     resources.files("pamrs.rig").joinpath("words.toml").read_text(encoding="utf-8")
 )
@@ -175,10 +175,12 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         _key(told["name"], key, _WORDS.get(told["name"], {}).get(key["name"], ""))
         for key in told["keys"]
     )
-    for told in _TOLD
+    for told in _CORE_BLOCKS
 }
 """Block -> its keys, in the order in which they are written."""
-ACTS: Final[dict[str, tuple[str, ...]]] = {told["name"]: tuple(told["acts_in"]) for told in _TOLD}
+ACTS: Final[dict[str, tuple[str, ...]]] = {
+    told["name"]: tuple(told["acts_in"]) for told in _CORE_BLOCKS
+}
 """Kinds of block of the cut rig in which a block of the rig acts."""
 PORTS: Final[dict[str, tuple[Port, ...]]] = {
     block: tuple(

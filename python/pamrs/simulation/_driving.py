@@ -40,7 +40,7 @@ _INITIAL = {
 }
 #: States along a tube that carries waves, and how many there are less than segments.
 _BETWEEN = {"segment_pressure": 1, "segment_flow": 0}
-_LEAST_PRESSURE = 1.0  # Pa, absolute
+_LEAST_ABSOLUTE_PRESSURE = 1.0  # Pa, absolute
 _MOST_PRESSURE = 1e8  # Pa, gauge
 
 
@@ -182,7 +182,7 @@ class Inputs:
         if channel == "length":
             low, high, unit = self._load["min_length"], self._load["max_length"], "m"
         else:
-            low, high, unit = _LEAST_PRESSURE - self._ambient, _MOST_PRESSURE, "Pa (gauge)"
+            low, high, unit = _LEAST_ABSOLUTE_PRESSURE - self._ambient, _MOST_PRESSURE, "Pa (gauge)"
         return low, high, f"a number from {low:g} to {high:g} {unit}"
 
     def _check_prescribed(self, given: Mapping[str, ArrayLike]) -> None:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 import math
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +16,6 @@ from pamrs._checks import check_kind, doubt_pascals, positive, quantities, refus
 from pamrs._tables import Columns, Tabular
 from pamrs._tables import over_time as columns_over_time
 from pamrs._views import Panels, View, in_laboratory_units, over_time
-from pamrs._writing import write_atomically
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
 from pamrs.rig import Rig, check_sample_time
@@ -453,63 +448,8 @@ class Simulation(View, Tabular, Mapping[str, Array]):
                 told[dotted(head, block)] = f"{span}, at the end {last}"
         return told | {"events": str(len(self.events))}
 
-    def figure(
-        self,
-        path: str | os.PathLike[str],
-        *,
-        recorded: Mapping[str, tuple[Array, Array]] | None = None,
-        nominal: Simulation | None = None,
-    ) -> Path:
-        """Write a picture of the channels over time, a PNG.
-
-        Parameters
-        ----------
-        path : path-like
-            The file.
-        recorded : mapping of str to (time, value), optional
-            Recorded channels to draw with them [s, SI].
-        nominal : Simulation, optional
-            The same run of another rig to draw with it: that of the rig file, where this one is
-            of a diagnosed model.
-
-        Returns
-        -------
-        Path
-            The file written.
-        """
-        return write_atomically(path, _motion().channels_png(self, recorded, nominal))
-
-    def animate(self, path: str | os.PathLike[str], *, speed: float = 1.0) -> Path:
-        """Write the arm as it moves, an animated GIF.
-
-        Parameters
-        ----------
-        path : path-like
-            The file.
-        speed : float
-            Times faster than it happens.
-
-        Returns
-        -------
-        Path
-            The file written.
-
-        Raises
-        ------
-        ParameterError
-            If the rig has no arm, there are fewer than two samples, or the speed is not a finite
-            number above zero.
-        """
-        written: Path = _motion().write_animation(self, Path(path), speed=speed)
-        return written
-
     def __repr__(self) -> str:
         return f"Simulation({self.rig.name}: {self.time.size} rows of {', '.join(self._channels)})"
-
-
-def _motion() -> ModuleType:
-    """The module that draws."""
-    return importlib.import_module("pamrs.report.motion")
 
 
 def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:

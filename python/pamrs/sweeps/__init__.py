@@ -1,29 +1,17 @@
 """Sweeps: many runs of a rig with other parameters, kept in a store that survives ``kill -9``.
 
 :func:`sweep` runs a grid or samples and gives a labelled result that need not fit in memory;
-:func:`samples` draws parameters within their tolerances, :func:`sensitivity` says which of them a
-result depends on, :func:`gain_map` closes a controller around every run. :func:`open_sweep` reads a
-result again.
+:func:`gain_map` closes a controller around every run. :func:`open_sweep` reads a result again.
 """
 
 from __future__ import annotations
 
-from pamrs.sweeps._axes import Axes, Grid, Samples
-from pamrs.sweeps._draws import DrawnSamples, Range, samples
 from pamrs.sweeps._loops import gain_map
-from pamrs.sweeps._sensitivity import sensitivity
 from pamrs.sweeps._store import open_sweep
 from pamrs.sweeps._sweep import sweep
 
 __all__ = [
-    "Axes",
-    "DrawnSamples",
-    "Grid",
-    "Range",
-    "Samples",
     "gain_map",
     "open_sweep",
-    "samples",
-    "sensitivity",
     "sweep",
 ]

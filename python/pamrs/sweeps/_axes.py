@@ -6,15 +6,14 @@ from __future__ import annotations
 
 import hashlib
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import as_column, check_column
+from pamrs._checks import as_column, as_numbers, check_column, refused
 from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, meant
@@ -36,18 +35,12 @@ class Quantity(NamedTuple):
         SI.
     lower, upper : float
         Bounds of the possible.
-    value : float
-        In the rig; NaN for an initial value.
-    tol : float
-        One standard deviation of what is known of it; 0 where the rig says nothing.
     """
 
     name: str
     unit: str
     lower: float
     upper: float
-    value: float
-    tol: float
 
 
 def quantity(rig: Rig, name: str) -> Quantity:
@@ -70,7 +63,7 @@ def quantity(rig: Rig, name: str) -> Quantity:
         If the rig has no such number; the message lists those that it has.
     """
     if name.startswith(INITIAL):
-        return Quantity(name, unit_of(name.removeprefix(INITIAL)), -np.inf, np.inf, np.nan, 0.0)
+        return Quantity(name, unit_of(name.removeprefix(INITIAL)), -np.inf, np.inf)
     of_effects = _effect_quantities(rig)
     if name in of_effects:
         return of_effects[name]
@@ -81,8 +74,7 @@ def quantity(rig: Rig, name: str) -> Quantity:
             f"'initial.joint_angle'; {meant(name, [*known, *of_effects])}"
         )
     found = known[name]
-    tol = found.tol if math.isfinite(found.tol) else 0.0
-    return Quantity(name, found.unit, found.lower, found.upper, found.value, tol)
+    return Quantity(name, found.unit, found.lower, found.upper)
 
 
 def _effect_quantities(rig: Rig) -> dict[str, Quantity]:
@@ -91,8 +83,7 @@ def _effect_quantities(rig: Rig) -> dict[str, Quantity]:
         full = ".".join(filter(None, (entry["id"], entry.get("at", ""))))
         for known in EFFECTS[entry["id"]].form(entry.get("form", "")).parameters:
             name = f"{full}.{known.name}"
-            value = float(entry["parameters"][known.name])
-            found[name] = Quantity(name, known.unit, known.lower, known.upper, value, 0.0)
+            found[name] = Quantity(name, known.unit, known.lower, known.upper)
     return found
 
 
@@ -147,33 +138,73 @@ class Blocks(NamedTuple):
         return start, start + math.prod(part.stop - part.start for part in region)
 
 
-class Axes(ABC):
-    """What varies from run to run: made by :class:`Grid` or :class:`Samples`."""
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """What varies from run to run: every combination of a grid, the last axis going fastest, or a
+    table of samples, run k in row k.
+
+    Attributes
+    ----------
+    values : dict of str to ndarray, shape (k,)
+        Name -> values in SI units; of one length in a table.
+    grid : bool
+        Whether it is a grid.
+    """
+
+    values: dict[str, Array]
+    grid: bool
+
+    @classmethod
+    def of(cls, over: Any, samples: ArrayLike | None = None) -> Axes:
+        """What a user varies; arguments and errors as of :func:`pamrs.sweep`."""
+        if samples is not None:
+            return cls(_table(over, samples), grid=False)
+        if not isinstance(over, Mapping) or not over:
+            found = "is empty" if isinstance(over, Mapping) else f"is a {type(over).__name__}"
+            raise ParameterError(
+                f"the grid {found}; a mapping of names to values is needed, "
+                "{'arm.payload': [5.0, 9.0]}, or names with samples="
+            )
+        values = {str(name): as_column(str(name), column) for name, column in over.items()}
+        for name, column in values.items():
+            if np.unique(column).size != column.size:
+                raise ParameterError(f"the values of {name} are not allowed: one is given twice")
+        return cls(values, grid=True)
 
     @property
-    @abstractmethod
     def names(self) -> tuple[str, ...]:
         """What varies."""
+        return tuple(self.values)
 
     @property
-    @abstractmethod
     def shape(self) -> tuple[int, ...]:
         """Of the result."""
+        sizes = tuple(column.size for column in self.values.values())
+        return sizes if self.grid else sizes[:1]
 
     @property
-    @abstractmethod
     def dims(self) -> tuple[str, ...]:
         """Names of the dimensions of the result."""
+        return self.names if self.grid else ("run",)
 
-    @abstractmethod
+    def __len__(self) -> int:
+        return math.prod(self.shape)
+
     def rows(self, start: int, stop: int) -> dict[str, Array]:
         """Values of the runs from ``start`` to before ``stop``, each of shape (stop - start,)."""
+        if not self.grid:
+            return {name: column[start:stop] for name, column in self.values.items()}
+        places = np.unravel_index(np.arange(start, stop), self.shape)
+        return {
+            name: column[at] for (name, column), at in zip(self.values.items(), places, strict=True)
+        }
 
-    @abstractmethod
     def describe(self) -> dict[str, str]:
         """What makes these runs these: name -> digest or words."""
+        kind = "values" if self.grid else "samples"
+        order = {"order of the axes": ", ".join(self.names)} if self.grid else {}
+        return order | {f"{kind} of {k}": f"{v.size}, {digest(v)}" for k, v in self.values.items()}
 
-    @abstractmethod
     def check(self, known: Callable[[str], Quantity]) -> None:
         """Refuse names that nobody knows, and values outside their bounds.
 
@@ -187,140 +218,26 @@ class Axes(ABC):
         ParameterError
             Naming parameter, value and what is allowed.
         """
-
-    def __len__(self) -> int:
-        return math.prod(self.shape)
-
-
-def _columns(given: Any, what: str) -> dict[str, Array]:
-    if not isinstance(given, Mapping) or not given:
-        found = "is empty" if isinstance(given, Mapping) else f"is a {type(given).__name__}"
-        raise ParameterError(
-            f"{what} {found}; a mapping of names to values is needed, "
-            "{'arm.payload': [5.0, 9.0]}, or pamrs.sweeps.Samples"
-        )
-    return {str(name): as_column(str(name), values) for name, values in given.items()}
-
-
-class _Listed(Axes):
-    """Axes whose values are all given."""
-
-    _values: dict[str, Array]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self._values)
-
-    def check(self, known: Callable[[str], Quantity]) -> None:
-        for name, column in self._values.items():
+        for name, column in self.values.items():
             own = known(name)
             check_column(name, column, own.lower, own.upper, own.unit)
 
 
+def _table(names: Any, samples: ArrayLike) -> dict[str, Array]:
+    """Columns of samples by their names."""
+    if isinstance(names, (str, Mapping)) or not isinstance(names, Sequence):
+        raise refused("over", names, "with samples= it lists the names of their columns")
+    numbers = as_numbers("samples", samples)
+    if numbers.ndim != 2 or numbers.shape[1] != len(names) or not numbers.size:
+        raise ParameterError(
+            f"samples has the shape {numbers.shape}; (runs, {len(names)}) is needed, a column for "
+            f"each of {', '.join(map(str, names))}"
+        )
+    if len(set(names)) < len(names):
+        raise refused("over", names, "each name once")
+    return {str(name): numbers[:, k].copy() for k, name in enumerate(names)}
+
+
 def digest(values: Array) -> str:
     """What tells numbers from others, for a plan."""
-    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
-
-
-@dataclass(frozen=True, eq=False)
-class Grid(_Listed):
-    """Every combination of the values of each axis; the last one goes fastest.
-
-    Parameters
-    ----------
-    axes : mapping of str to array_like, shape (k,)
-        Name -> values in SI units.
-
-    Raises
-    ------
-    ParameterError
-        If it is empty, or values are not a row of numbers.
-    """
-
-    axes: Mapping[str, ArrayLike]
-    _values: dict[str, Array] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        values = _columns(self.axes, "the grid")
-        for name, column in values.items():
-            if np.unique(column).size != column.size:
-                raise ParameterError(f"the values of {name} are not allowed: one is given twice")
-        object.__setattr__(self, "_values", values)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return tuple(column.size for column in self._values.values())
-
-    @property
-    def dims(self) -> tuple[str, ...]:
-        return self.names
-
-    def column(self, name: str) -> Array:
-        """The values of one axis, shape (k,)."""
-        return self._values[name].copy()
-
-    def rows(self, start: int, stop: int) -> dict[str, Array]:
-        places = np.unravel_index(np.arange(start, stop), self.shape)
-        return {
-            name: column[at]
-            for (name, column), at in zip(self._values.items(), places, strict=True)
-        }
-
-    def describe(self) -> dict[str, str]:
-        order = {"order of the axes": ", ".join(self.names)}
-        return order | {f"values of {k}": f"{v.size}, {digest(v)}" for k, v in self._values.items()}
-
-
-@dataclass(frozen=True, eq=False)
-class Samples(_Listed):
-    """A table of runs: run k has entry k of every column.
-
-    Parameters
-    ----------
-    columns : mapping of str to array_like, shape (n,)
-        Name -> values in SI units, of one length.
-
-    Raises
-    ------
-    ParameterError
-        If it is empty, values are not a row of numbers, or the lengths differ.
-
-    Examples
-    --------
-    >>> import pamrs
-    >>> len(pamrs.sweeps.Samples({"arm.payload": [5.0, 9.0], "arm.viscous": [3.0, 2.0]}))
-    2
-    """
-
-    columns: Mapping[str, ArrayLike]
-    _values: dict[str, Array] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        values = _columns(self.columns, "the table of samples")
-        sizes = {name: column.size for name, column in values.items()}
-        if len(set(sizes.values())) > 1:
-            raise ParameterError(
-                "the columns of samples have different lengths: "
-                + ", ".join(f"{name} has {size}" for name, size in sizes.items())
-            )
-        object.__setattr__(self, "_values", values)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return (next(iter(self._values.values())).size,)
-
-    @property
-    def dims(self) -> tuple[str, ...]:
-        return ("run",)
-
-    def rows(self, start: int, stop: int) -> dict[str, Array]:
-        return {name: column[start:stop] for name, column in self._values.items()}
-
-    def describe(self) -> dict[str, str]:
-        return {f"samples of {k}": f"{v.size}, {digest(v)}" for k, v in self._values.items()}
-
-
-def chosen(names: Sequence[str] | str | None, default: Sequence[str]) -> list[str]:
-    """Names as a list without repetitions; those of ``default`` where none are given."""
-    given = default if names is None else [names] if isinstance(names, str) else names
-    return list(dict.fromkeys(given))
+    return hashlib.sha256(np.ascontiguousarray(values).data).hexdigest()

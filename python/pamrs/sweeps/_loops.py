@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
@@ -61,7 +61,7 @@ class ClosedLoop(Drive):
 
     def quantity(self, rig: Rig, name: str) -> Quantity:
         if name.startswith(GAIN):
-            return Quantity(name, "1", -np.inf, np.inf, np.nan, 0.0)
+            return Quantity(name, "1", -np.inf, np.inf)
         try:
             return super().quantity(rig, name)
         except ParameterError as error:
@@ -125,9 +125,10 @@ def _name_of(controller: Any) -> str:
 def gain_map(
     rig: Rig,
     controller: Callable[..., Any],
-    over: Mapping[str, ArrayLike] | Axes,
+    over: Mapping[str, ArrayLike] | Sequence[str],
     trajectory: Trajectory,
     *,
+    samples: ArrayLike | None = None,
     duration: float | None = None,
     sample_time: float | None = None,
     step: float | None = None,
@@ -146,7 +147,7 @@ def gain_map(
     controller : callable
         Makes the controller of all plants from arrays of gains by name: a class such as
         ``control.PID``, or a function of a module, ``functools.partial`` for fixed gains.
-    over : mapping of str to array_like, or Samples
+    over, samples
         As for :func:`sweep`; a gain has the name ``gain.kp``.
     trajectory : Trajectory
         What the joint should do.
@@ -175,4 +176,4 @@ def gain_map(
     loop |= {"initial": {k: float(v) for k, v in initial.items()}} if initial else {}
     hangs = any(load.get("kind", "mass") == "mass" for load in rig.tables("load").values())
     drive = ClosedLoop(controller, trajectory, loop, by_length=hangs)
-    return run_plan(rig, over, drive, store=store, **runs)
+    return run_plan(rig, Axes.of(over, samples), drive, store=store, **runs)

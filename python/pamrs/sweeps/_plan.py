@@ -79,15 +79,13 @@ class Plan:
 #: Entries of a plan that are one argument of :func:`pamrs.sweep`, by how they begin.
 _ARGUMENTS: Final = {
     "values of ": "over[{!r}]",
-    "samples of ": "over[{!r}]",
+    "samples of ": "samples of {}",
     "metric ": "metrics[{!r}]",
     "initial ": "initial[{!r}]",
     "loop ": "{}",
 }
 _CALLED: Final = {
     "order of the axes": "over (order of the axes)",
-    "order of the parameters": "over (order of the parameters)",
-    "samples": "over",
     "runs of a chunk": "chunk",
 }
 _MOST_TOLD: Final = 4

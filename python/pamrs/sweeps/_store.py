@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError, joined, missing_package
-from pamrs.sweeps._axes import Grid
 from pamrs.sweeps._plan import Plan, differences
 
 if TYPE_CHECKING:
@@ -158,7 +157,7 @@ class Store:
         region, (start, stop) = blocks.region(chunk), blocks.runs(chunk)
         shape = tuple(part.stop - part.start for part in region)
         columns = {**done.metrics, ENDED_AT: done.ended_at}
-        if not isinstance(axes, Grid):
+        if not axes.grid:
             columns = {**values, **columns}
         places = tuple(part.start // size for part, size in zip(region, blocks.block, strict=True))
         for name, column in columns.items():
@@ -176,7 +175,7 @@ class Store:
         return entry
 
     def _names(self) -> list[str]:
-        coordinates = [] if isinstance(self.plan.axes, Grid) else list(self.plan.axes.names)
+        coordinates = [] if self.plan.axes.grid else list(self.plan.axes.names)
         return [*coordinates, *self.plan.drive.metric_units(), ENDED_AT]
 
     def _make(self, rig: Rig) -> None:
@@ -202,10 +201,10 @@ class Store:
         axes, blocks = self.plan.axes, self.plan.blocks
         new.parent.mkdir(parents=True, exist_ok=True)
         group = zarr.create_group(str(new), attributes={"rig": self.plan.rig_name})
-        if isinstance(axes, Grid):
-            for name in axes.names:
+        if axes.grid:
+            for name, values in axes.values.items():
                 array = group.create_array(
-                    name, data=axes.column(name), dimension_names=[name], chunks=(2**16,)
+                    name, data=values, dimension_names=[name], chunks=(2**16,)
                 )
                 array.attrs["units"] = self.plan.drive.quantity(rig, name).unit
             units = {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pamrs._checks import as_numbers, check_kind, finite, misshapen, quantities, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig, check_sample_time
-from pamrs.sweeps._axes import INITIAL, Axes, Grid
+from pamrs.sweeps._axes import INITIAL, Axes
 from pamrs.sweeps._drives import Drive, OpenLoop, metric_of, run_chunk
 from pamrs.sweeps._plan import Plan
 from pamrs.sweeps._progress import Progress
@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 @quantities
 def sweep(
     rig: Rig,
-    over: Mapping[str, ArrayLike] | Axes,
+    over: Mapping[str, ArrayLike] | Sequence[str],
     metrics: Mapping[str, tuple[Any, ...]],
     *,
+    samples: ArrayLike | None = None,
     sample_time: float,
     valve_command: ArrayLike | Mapping[str, ArrayLike] | None = None,
     supply_command: ArrayLike | Mapping[str, ArrayLike] | None = None,
@@ -54,16 +55,18 @@ def sweep(
     ----------
     rig : Rig
         The model.
-    over : mapping of str to array_like, shape (k,), or Samples or DrawnSamples
+    over : mapping of str to array_like, shape (k,), or sequence of str
         A grid: name -> values [SI], all combinations. Names are parameters of the rig
         (``arm.payload``) and of its effects (``leak_muscle.conductance``), and initial values
-        (``initial.joint_angle``). Or samples: :func:`pamrs.sweeps.samples`,
-        :class:`pamrs.sweeps.Samples`. Parameters of which the wiring depends (lengths of joints and
-        muscles, stops, gas) need a rig of their own for each value, which takes longer.
+        (``initial.joint_angle``). With ``samples`` the names of their columns. Parameters of which
+        the wiring depends (lengths of joints and muscles, stops, gas) need a rig of their own for
+        each value, which takes longer.
     metrics : mapping of str to tuple
         Name -> ``(reduction, channel)`` with the reductions ``final``, ``min``, ``max``, ``peak``
         (the largest magnitude) and ``mean``, or ``("squared_error", channel, reference)``, the time
         integral of the squared difference from a number or from one for each sample.
+    samples : array_like, shape (runs, len(over)), optional
+        Values [SI], a run in each row: what a sampler of SALib or ``scipy.stats.qmc`` gives.
     sample_time : float
         Time between samples [s].
     valve_command, supply_command, length, pressure
@@ -133,7 +136,7 @@ def sweep(
     )
     return run_plan(
         rig,
-        over,
+        Axes.of(over, samples),
         drive,
         store=store,
         executor=executor,
@@ -155,7 +158,7 @@ def _signal(name: str, given: Any) -> Any:
 
 def run_plan(
     rig: Rig,
-    over: Mapping[str, ArrayLike] | Axes,
+    axes: Axes,
     drive: Drive,
     *,
     store: str | os.PathLike[str],
@@ -167,7 +170,6 @@ def run_plan(
 ) -> xr.Dataset:
     """Run what a drive says over axes; other arguments, result and errors as of :func:`sweep`."""
     check_kind("rig", rig, Rig, "a Rig (pamrs.rigs.shoulder(), pamrs.load_rig(path))")
-    axes = over if isinstance(over, Axes) else Grid(over)
     axes.check(lambda name: drive.quantity(rig, name))
     _check_names(axes, drive)
     if chunk is not None:

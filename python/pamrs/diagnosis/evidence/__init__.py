@@ -4,8 +4,8 @@ Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_
 `autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
 `BlockLikelihood` (how probable recordings are);
 `weigh`, `explains`, `is_absent`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
-`possible_gain`, `Weighing` (their weights); `drop_undetermined`, `with_stated_std`, `put_aside`
-(names that do not hold); `Judged`, `judge`, `case_verdict`, `case_probabilities`,
+`possible_gain`, `Weighing` (their weights); `drop_undetermined`, `with_stated_std`, `is_outside`,
+`put_aside` (names that do not hold); `Judged`, `judge`, `case_verdict`, `case_probabilities`,
 `case_ambiguity`, `parameters_at_wall` (verdicts).
 """
 
@@ -24,6 +24,7 @@ from pamrs.diagnosis.evidence._candidates import (
 )
 from pamrs.diagnosis.evidence._determined import (
     drop_undetermined,
+    is_outside,
     put_aside,
     with_stated_std,
 )
@@ -66,6 +67,7 @@ __all__ = [
     "drop_undetermined",
     "misses_only_held_out",
     "explains",
+    "is_outside",
     "is_absent",
     "judge",
     "log_weight",

@@ -132,21 +132,7 @@ class Candidate:
 
     def outside_of(self, name: str, walls: float) -> float:
         """The same of one of its wrong parameters."""
-        return math.log(max(1.0, self._distance(name) / walls))
-
-    def _distance(self, name: str) -> float:
-        """How far a parameter is from its nominal value in tolerances; of one that cannot be
-        negative by the logarithm of their ratio, where that is further: a hundredth of an area is
-        rarer than the plain difference says.
-        """
-        moved, tolerance = self.fit.moved[name], self.fit.scales[name]
-        value = self.fit.values[name]
-        nominal = value - moved * tolerance
-        known = self.fit.rig.parameters.get(name)
-        if nominal <= 0.0 or known is None or known.lower < 0.0:
-            return abs(moved)
-        ratio = max(value / nominal, 1e-9)
-        return max(abs(moved), abs(math.log(ratio)) * nominal / tolerance)
+        return math.log(max(1.0, abs(self.fit.moved[name]) / walls))
 
     def is_wrong(self, walls: float) -> bool:
         """Whether everything that it calls wrong lies outside its tolerances, so many of them."""

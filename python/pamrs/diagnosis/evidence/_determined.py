@@ -11,8 +11,10 @@ from pamrs.diagnosis.evidence._weighing import (
     fitted_sizes,
     is_near_none,
     may_be_inside,
+    value_may_be_inside,
 )
-from pamrs.diagnosis.fit import Problem, spread_over_pieces
+from pamrs.diagnosis.fit import Fit, Problem, spread_over_pieces
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis
 
 # stated deviations within which a size, or that a value is wrong, is not determined; a stated one
@@ -68,6 +70,12 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
             found[candidate.hypothesis] -= lost * chance
             found[to] = found.get(to, 0.0) + lost * chance
     return replace(group, probabilities=found)
+
+
+def is_outside(found: Fit, name: str, settings: DiagnosisSettings) -> bool:
+    """Whether a value is outside its tolerances by its stated standard deviation."""
+    walls = settings.most_tolerances
+    return not value_may_be_inside(found, name, walls, _DETERMINED_STDS)
 
 
 def _has_undetermined_effect(candidate: Candidate) -> bool:

@@ -22,6 +22,7 @@ _ERROR_TIME = 1.0  # [s] correlation time of the error that nobody states (decis
 # [noise levels] sizes of that error that are worked out; half a decade apart splines are smooth
 _SIZES = 10.0 ** np.arange(-1.0, 7.1, 0.5)
 _BETWEEN = 10.0 ** np.linspace(-1.0, 7.0, 321)  # [noise levels] those between that are tried
+_CURVE_DEVIATIONS = 2.0  # [standard deviations] height of a curve of the model's error at the most
 _LEAST_SQUARE = 1e-3  # square below which differences say nothing
 
 
@@ -44,6 +45,8 @@ class BlockLikelihood:
         How many bins there are.
     power : float
         Mean square of the bin means, in noise levels squared.
+    error_power : float
+        The most of it that noise and the curves of the model's error are likely to have.
     """
 
     sizes: Array
@@ -51,6 +54,7 @@ class BlockLikelihood:
     volume: Array
     count: int
     power: float
+    error_power: float = 1.0
 
     @property
     def most(self) -> float:
@@ -59,9 +63,14 @@ class BlockLikelihood:
 
     @property
     def size(self) -> float:
-        """The most probable size; infinite where nothing is probable."""
+        """The most probable size, and what the curves of the model's error have to take beyond
+        what they are expected to; infinite where nothing is probable.
+        """
         best = int(self.by_size.argmax())
-        return float(self.sizes[best]) if math.isfinite(self.by_size[best]) else math.inf
+        if not math.isfinite(self.by_size[best]):
+            return math.inf
+        beyond = math.sqrt(max(0.0, self.power - self.error_power))
+        return max(float(self.sizes[best]), beyond)
 
     def expected(self, size: float) -> float:
         """Logarithm of the density of rows that have an error of this size, and no more."""
@@ -132,6 +141,9 @@ class _Covariance:
         self._sizes = np.array([0.0, *_BETWEEN])
         volume = self._between([sized.volume for sized in self._each])
         self._volume = np.array([self._without.volume, *volume])
+        bent = [float(np.sum(c**2)) for c in curves]
+        mean = sum(bent) / max(1, sum(t.size for t in times))
+        self._error_power = 1.0 + _CURVE_DEVIATIONS**2 * mean
 
     def _between(self, values: list[float]) -> Array:
         """Values for each size worked out, for all those that are tried."""
@@ -144,11 +156,14 @@ class _Covariance:
         count, power = sum(y.size for y in rows), sum(float(y @ y) for y in rows)
         if not math.isfinite(power):
             never = np.full(self._sizes.size, -math.inf)
-            return BlockLikelihood(self._sizes, never, self._volume, count, math.inf)
+            return BlockLikelihood(
+                self._sizes, never, self._volume, count, math.inf, self._error_power
+            )
         logs = [math.log(max(sized.square(rows), _LEAST_SQUARE)) for sized in self._each]
         square = np.array([self._without.square(rows), *np.exp(self._between(logs))])
         by_size = -0.5 * (square + self._volume)
-        return BlockLikelihood(self._sizes, by_size, self._volume, count, power / max(1, count))
+        mean = power / max(1, count)
+        return BlockLikelihood(self._sizes, by_size, self._volume, count, mean, self._error_power)
 
 
 class _Sized:

@@ -41,7 +41,7 @@ _STRAIN_SHARE = 0.5  # share of the priors' sum of squares that counts (decision
 _TELLING_EXCESS = 0.5
 _TELLING_SHARE = 0.9  # share of the largest excess from which recordings always are
 # share left of hardly a mismatch by what explains it: it has to take 30 % (decision 20)
-_CLEAR_SHARE = 0.7
+_EXPLAINED_SHARE = 0.7
 # share of a mismatch by which forms that leave as much differ (decision 20)
 FORM_SHARE_ALIKE = 0.01
 # log odds: an effect like another, as a parameter is near zero; 7 to 1 (decision 20)
@@ -187,8 +187,8 @@ def _rarity(candidate: Candidate, weighing: Weighing) -> float:
 
 
 def _strain(candidate: Candidate) -> float:
-    """What a hypothesis loses by how far parameters moved."""
-    return 0.5 * _STRAIN_SHARE * candidate.fit.strain
+    """What a hypothesis loses by how far parameters moved, and how warm gases began."""
+    return 0.5 * _STRAIN_SHARE * (candidate.fit.strain + candidate.fit.start_strain)
 
 
 def _evidence(
@@ -267,7 +267,7 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
         significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out)
     )
     before, after = max(_excesses(candidate, baseline, suspects))
-    return quiet and after < _CLEAR_SHARE * before
+    return quiet and after < _EXPLAINED_SHARE * before
 
 
 def is_absent(candidate: Candidate, walls: float) -> bool:
@@ -318,11 +318,14 @@ def may_be_inside(candidate: Candidate, walls: float, stds: float) -> bool:
     """Whether a value that is called wrong may be inside its tolerances, so many standard
     deviations off.
     """
-    found = candidate.fit
-    return any(
-        abs(found.moved[name]) - walls < stds * found.std.get(name, 0.0) / found.scales[name]
-        for name in candidate.wrong
-    )
+    return any(value_may_be_inside(candidate.fit, name, walls, stds) for name in candidate.wrong)
+
+
+def value_may_be_inside(found: Fit, name: str, walls: float, stds: float) -> bool:
+    """Whether a fit has a value inside its tolerances (so many of them), or so many of its standard
+    deviations outside.
+    """
+    return abs(found.moved[name]) - walls < stds * found.std.get(name, 0.0) / found.scales[name]
 
 
 def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:

@@ -43,7 +43,7 @@ from pamrs.diagnosis.model import (
     with_std,
 )
 from pamrs.diagnosis.noise import NoiseLevel
-from pamrs.diagnosis.prepare import Residual, Unjudged
+from pamrs.diagnosis.prepare import Residual, Unjudged, said_of_warm_starts
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.effects import CATALOGUE, Hypothesis, Term, effect_of
 from pamrs.findings import (
@@ -70,7 +70,7 @@ from pamrs.rig import Rig
 # [noise levels] gap of refit to noise below which nothing is said of how much closes
 _LEAST_GAP = 0.05
 # [tolerances] standard deviation below which a parameter counts as determined by the recordings
-_KNOWN_SHARE = 0.7
+_DETERMINED_SHARE = 0.7
 
 
 Array = NDArray[np.float64]
@@ -118,6 +118,8 @@ def assemble(
         stages.insert(0, (held, found.outside))
     effects = _effects(judged, verdict, fitted)
     constants = said_of_constants(found.runs or [], [effect.id for effect in effects])
+    warm = {**found.inside["after"], **found.outside["after"]}
+    begun = said_of_warm_starts(fitted.blocks, [*fitted.recordings, *held.recordings], warm)
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
@@ -128,7 +130,7 @@ def assemble(
         parameters=_parameters(nominal, known, owners),
         fit=FitErrors(found.errors["fit"], found.errors["held_out"], gap),
         next_experiment=proposal,
-        warnings=constants + _warnings(case, models, found.table, same=held is fitted),
+        warnings=constants + _warnings(case, models, found.table, same=held is fitted) + begun,
         rig=models.final
         if verdict == "none"
         else with_std(models.final, nominal, models.chosen, models.owners),
@@ -383,7 +385,7 @@ def _wrong(
                 std=std,
                 interval=_interval(value, std, known.lower),
                 unit=known.unit,
-                moved_sigmas=own.moved[name],
+                moved_sigmas=(value - known.value) / known.tol,
                 probability=max(j.probability(Term(name)) for j in naming),
                 held_out={
                     channel: StageError(e.before, e.refit, e.after) for channel, e in errors.items()
@@ -495,8 +497,8 @@ def _parameters(
             value=own.values[name],
             std=own.std[name],
             unit=p.unit,
-            moved_sigmas=own.moved[name],
-            identifiable=own.std[name] < _KNOWN_SHARE * p.tol,
+            moved_sigmas=(own.values[name] - p.value) / p.tol,
+            identifiable=own.std[name] < _DETERMINED_SHARE * p.tol,
         )
     return out
 

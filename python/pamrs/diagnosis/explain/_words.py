@@ -28,12 +28,12 @@ from pamrs.units import in_words
 # [noise levels] error of a model with a name from which it is reported with a reservation
 _MISSED_NOISES = 3.0
 _MOVED_TOLERANCES = 2.0  # [tolerances] movement of a parameter beside an effect from which it is
-# relative scatter of an effect's size between recordings that is reported, as in evidence
+# relative scatter of an effect's size between recordings from which it is reported
 _SCATTER = 0.35
 # share of the ambient pressure within which a recording that begins at it may be absolute
 _AMBIENT_SHARE = 0.01
 # [Pa] gauge pressure that a channel never exceeds, below which its unit is questioned
-_LEAST_PRESSURE = 1e4
+_DOUBTED_PRESSURE = 1e4
 # probability of no mismatch from which the text says that there may be none
 _NO_MISMATCH_PROBABILITY = 0.1
 # share of the excess over share of the time from which a condition is told
@@ -147,7 +147,7 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
             ):
                 continue
             largest = float(np.nanmax(np.abs(values[recording.mask[channel]])))
-            if largest < _LEAST_PRESSURE:
+            if largest < _DOUBTED_PRESSURE:
                 out.append(
                     f"{recording.name}: {channel} never exceeds "
                     f"{in_words(recording.said.get(channel, ''), 'Pa', largest)} gauge, next to "

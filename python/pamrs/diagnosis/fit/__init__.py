@@ -8,7 +8,8 @@ Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
 `depends`, `fits`, `places_of`, `same_data_in` (where effects act); `holdable`,
 `without_passing`, `known_parameters`, `with_known` (effects that the nominal model holds, and what
-is known of all parameters); `spread_over_pieces` (standard deviations of coloured residuals).
+is known of all parameters); `ends_in_tolerances` (how far they may move); `spread_over_pieces`
+(standard deviations of coloured residuals).
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ from pamrs.diagnosis.fit._starts import (
     with_entry,
     without_term,
 )
+from pamrs.diagnosis.fit._tolerances import ends_in_tolerances
 from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
 
 __all__ = [
@@ -78,6 +80,7 @@ __all__ = [
     "changes",
     "concerns",
     "depends",
+    "ends_in_tolerances",
     "entry_of",
     "events_of",
     "fit",

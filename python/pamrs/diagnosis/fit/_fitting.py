@@ -21,6 +21,12 @@ from pamrs.diagnosis.fit._acting import acts_in, core_names, depends
 from pamrs.diagnosis.fit._held import known_parameters, with_known
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._starts import without_term
+from pamrs.diagnosis.fit._tolerances import (
+    ends_in_tolerances,
+    in_tolerances,
+    moved_slope,
+    moved_value,
+)
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS, Hypothesis, Term, effect_of, find_parameter, usual_values
@@ -28,8 +34,6 @@ from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig, default_step
 
-# multiple of its nominal value, or of other walls, for a freed parameter (decision 25)
-_FREED_MULTIPLE = 10.0
 # share of an effect parameter's usual start that its scale in a fit has at the least
 _LEAST_SCALE = 0.01
 LEAST_START = 1e-3  # share of a typical size from which a parameter goes on that a fit left at zero
@@ -193,6 +197,11 @@ class Fit:
     def strain(self) -> float:
         """How far it had to leave the nominal values: the sum of squares of its priors."""
         return sum(moved * moved for moved in self.held_by_prior.values())
+
+    @property
+    def start_strain(self) -> float:
+        """How unlikely the starts of gases are: the sum of squares of their priors."""
+        return sum(r.strain for r in self.residuals.values())
 
 
 def residuals(
@@ -359,16 +368,9 @@ class Scaling:
         self.known = known = known_parameters(nominal)
         self.scale = {n: known[n].tol for n in baseline}
         self.centre = {n: known[n].value for n in baseline}
-        walls = {n: settings.most_tolerances * known[n].tol for n in baseline}
-        reach = {n: _reach(known[n], settings) if n in freed else walls[n] for n in baseline}
-        lower = [
-            (max(known[n].lower, self.centre[n] - reach[n]) - self.centre[n]) / self.scale[n]
-            for n in baseline
-        ]
-        upper = [
-            (min(known[n].upper, self.centre[n] + reach[n]) - self.centre[n]) / self.scale[n]
-            for n in baseline
-        ]
+        walls = settings.most_tolerances
+        ends = [ends_in_tolerances(known[n], walls, freed=n in freed) for n in baseline]
+        lower, upper = [low for low, _ in ends], [high for _, high in ends]
         for name, start in starts.items():
             info = find_parameter(name)
             if _logarithmic(name):
@@ -389,14 +391,15 @@ class Scaling:
     def value(self, name: str, x: float) -> float:
         """A parameter [SI] from its scaled number."""
         if name in self.centre:
-            known = self.known[name]
-            return min(max(self.centre[name] + x * self.scale[name], known.lower), known.upper)
+            return moved_value(self.known[name], x)
         info = find_parameter(name)
         found = self.starts[name] * math.exp(x) if _logarithmic(name) else x * self.scale[name]
         return min(max(found, info.lower), info.upper)
 
     def slope(self, name: str, x: float) -> float:
         """Change of a parameter [SI] with its scaled number."""
+        if name in self.centre:
+            return moved_slope(self.known[name], x)
         return self.value(name, x) if _logarithmic(name) else self.scale[name]
 
     def rig(self, x: Array, fixed: dict[str, float]) -> Rig:
@@ -408,14 +411,6 @@ class Scaling:
             form = self.forms.get(effect, "")
             rig = rig.with_effect(effect.id, effect.own(chosen), at=effect.at, form=form)
         return rig
-
-
-def _reach(parameter: Parameter, settings: DiagnosisSettings) -> float:
-    """How far a parameter that is freed may move [SI], if its bounds allow it."""
-    return max(
-        _FREED_MULTIPLE * abs(parameter.value),
-        _FREED_MULTIPLE * settings.most_tolerances * parameter.tol,
-    )
 
 
 def bin_width(prepared: Prepared, seconds: float) -> int:
@@ -636,7 +631,7 @@ def fit(
     start = scaling.start.copy()
     for index, name in enumerate(baseline):
         if warm is not None and name in warm.values:
-            start[index] = (warm.values[name] - scaling.centre[name]) / scaling.scale[name]
+            start[index] = in_tolerances(scaling.known[name], warm.values[name])
     limit = own.fit_evaluations if evaluations is None else evaluations
     x, (values, jacobian, found), spent = levenberg_marquardt(
         evaluate, start, scaling.bounds, limit, share

@@ -45,9 +45,9 @@ _LAST_TIME = 0.5  # [s] time before the end of the recording from which none is 
 # [s] before an event from which its signature counts: the smoothing of drives reaches back
 _EARLY = 0.1
 _LEAST_DISTANCE = 1.0  # [s] least time between two events
-_LEAST_GAIN = 25.0  # [chi-square] gain from which an event counts (decision 20)
+_LEAST_EVENT_GAIN = 25.0  # [chi-square] gain from which an event counts (decision 20)
 # share of what the recording's residual is from which an event counts (decision 20)
-_LEAST_SHARE = 0.03
+_EVENT_SHARE = 0.03
 _TIME_SCALE = 0.2  # [s] scale of an event's time in a fit
 _DURATION_SCALE = 0.4  # [s] scale of its duration
 _RISE_SCALE = 0.2  # [s] scale of the time of its edges
@@ -56,7 +56,7 @@ _LEAST_DURATION = 0.05  # [s] shortest duration of an event
 _MOST_DURATION = 5.0  # [s] longest duration of an event
 _LEAST_RISE = 0.02  # [s] shortest edge of an event (a blow)
 _MOST_RISE = 2.0  # [s] longest edge of an event (a hand)
-_MOST_SIZE = 1e3  # [SI] largest size of an event that a fit may reach
+_MOST_EVENT_SIZE = 1e3  # [SI] largest size of an event that a fit may reach
 _EVALUATIONS_ALONE = 8  # evaluations of the fit of one recording's events at the most
 _EVALUATIONS_TOGETHER = 12  # evaluations of the fit of baseline and events of all recordings
 
@@ -154,7 +154,9 @@ def fit_events(
             usual = found if last is None else last.events
             begun = usual if usual is None or form is forms[0] else _in_form(usual, form.name)
         again = None if begun is None else _jointly(begun, problem, nominal, baseline, inflation)
-        if again is not None and (last is None or 2.0 * (last.cost - again.cost) > _LEAST_GAIN):
+        if again is not None and (
+            last is None or 2.0 * (last.cost - again.cost) > _LEAST_EVENT_GAIN
+        ):
             last = again
     if last is None:
         return None
@@ -281,7 +283,7 @@ def _drifting(
         alone, name = replace(problem, recordings=[prepared]), prepared.recording.name
         own = {key: r for key, r in base.items() if key[1] == name}
         rows, _ = stacked(alone, own, inflation)
-        least = max(_LEAST_GAIN, _LEAST_SHARE * float(rows @ rows))
+        least = max(_LEAST_EVENT_GAIN, _EVENT_SHARE * float(rows @ rows))
         for shape in itertools.product(*shapes):
             tried = {leading.name: _tried(leading), **dict(shape)}
             there = Events(effect, {name: tried}, form).put_into(rig, name)
@@ -346,7 +348,7 @@ def _scan(
             if all(abs(t - s) >= _LEAST_DISTANCE for s in chosen)
         }
         best = max(gains, key=lambda t: gains[t], default=0.0)
-        if gains.get(best, 0.0) < max(_LEAST_GAIN, _LEAST_SHARE * float(rows @ rows)):
+        if gains.get(best, 0.0) < max(_LEAST_EVENT_GAIN, _EVENT_SHARE * float(rows @ rows)):
             break
         chosen.append(best)
         columns = np.stack([signatures[t] for t in chosen], axis=1)
@@ -440,7 +442,7 @@ def _limits(effect: Term, parameter: str, prepared: Prepared) -> tuple[float, fl
         "duration": (_LEAST_DURATION, _MOST_DURATION),
         "rise": (_LEAST_RISE, _MOST_RISE),
     }
-    size = max(info.lower, -_MOST_SIZE), min(info.upper, _MOST_SIZE)
+    size = max(info.lower, -_MOST_EVENT_SIZE), min(info.upper, _MOST_EVENT_SIZE)
     if effect.info.own:
         size = info.lower, info.upper
     return limits.get(_first_of(effect, parameter).role, size)

@@ -24,6 +24,7 @@ from pamrs.diagnosis.evidence import (
     case_probabilities,
     case_verdict,
     drop_undetermined,
+    is_outside,
     judge,
     parts_of,
     put_aside,
@@ -50,6 +51,7 @@ from pamrs.diagnosis.model._free_run import KnownValues, free_run
 from pamrs.diagnosis.model._owners import owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, NONE, PARAMETERS, Hypothesis, Term
 from pamrs.errors import SimulationError
 from pamrs.findings import BudgetTerm, ChannelError, FreeRun, Trace, channels_off
@@ -221,8 +223,9 @@ def _sound_models(
     """The rig at every stage with names that spoil no channel, and the residuals of the recordings
     to fit and of the held-out ones.
 
-    What leads a group and predicts a channel worse than the model without it does is put aside, and
-    the group is judged again without it.
+    What leads a group and predicts a channel worse than the model without it does, or calls a value
+    wrong that the model has inside its tolerances, is put aside, and the group is judged again
+    without it.
     """
     settings = fitted.settings
     groups = [drop_undetermined(group, fitted) for group in groups]
@@ -233,7 +236,7 @@ def _sound_models(
         outside = inside if held is fitted else models.residuals(held)
         problem, found = (fitted, inside) if held is fitted else (held, outside)
         spoilt = spoiled_channels(_table(problem, found, noise_level))
-        blamed = _blamed(models.judged, spoilt)
+        blamed = _blamed(models.judged, spoilt) | _needless(models, settings)
         if not blamed:
             return models, inside, outside
         groups = [
@@ -242,9 +245,21 @@ def _sound_models(
         ]
 
 
+def _needless(models: Models, settings: DiagnosisSettings) -> set[int]:
+    """Groups that call a value wrong which is inside its tolerances as the group has it that knows
+    it best.
+    """
+    return {
+        k
+        for k, judged in enumerate(models.judged)
+        for name in judged.wrong
+        if not is_outside(models.chosen[models.owners[name]].fit, name, settings)
+    }
+
+
 def _without_name(group: BlockGroup, judged: Judged) -> BlockGroup:
     """A group without what it adds to the model: its name, or the form of what has none."""
-    if judged.named:
+    if judged.added:
         return put_aside(group, judged.chosen.hypothesis)
     return replace(group, closure=None)
 

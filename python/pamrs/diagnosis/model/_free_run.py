@@ -84,7 +84,7 @@ def free_run(
     """Errors of free-running simulations of every recording.
 
     A simulation begins at the recording's first usable values, its gases as warm as the room or as
-    their thermometers or first transients say, and then knows its commands only. It
+    their thermometers or pressures say, and then knows its commands only. It
     costs a few hundredths of a second for each recording and model, and raises nothing: a model
     that leaves its range has no number and a note that says so.
 
@@ -109,7 +109,7 @@ def free_run(
         the recording that the nominal model misses most, in noise levels, channel by channel.
     """
     runs, missing, curves, most = [], [], list[Trace](), -1.0
-    for prepared in problem.recordings:
+    for prepared in (_with_starts(p, problem, found["after"]) for p in problem.recordings):
         recording = prepared.recording
         try:
             there = _with(final, events, recording)
@@ -123,6 +123,12 @@ def free_run(
     if not runs:
         return None, "no free run: " + "; ".join(missing), []
     return runs, "without a free run: " + "; ".join(missing) if missing else "", curves
+
+
+def _with_starts(prepared: Prepared, problem: Problem, found: dict[Key, Residual]) -> Prepared:
+    """A recording with the temperatures at which its gases began, as their blocks have them."""
+    own = {b.channel: found[b.name, prepared.recording.name].temperature for b in problem.blocks}
+    return replace(prepared, temperatures={n: kelvin for n, kelvin in own.items() if kelvin})
 
 
 def _with(rig: Rig, events: Events | None, recording: Recording) -> Rig:

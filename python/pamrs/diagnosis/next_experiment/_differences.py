@@ -40,7 +40,7 @@ from pamrs.simulation import Simulation, core_rig, has_frame, reading
 # realisations of the drives' noise for an experiment's noise level: a fifth is enough
 _REPLICATES = 4
 # relative standard deviation of an effect's parameter of which a model says none
-_KNOWN_SHARE = 0.5
+_UNSTATED_STD_SHARE = 0.5
 # [Pa] of a pressure where no recording tells: usual 14 bar transducer, 16-bit converter
 _PRESSURE_NOISE = 200.0
 _ANGLE_NOISE = math.radians(0.03)  # [rad] of an angle: usual Hall sensor
@@ -263,7 +263,7 @@ def _free(problem: Problem, rig: Rig) -> dict[str, float]:
         spread = rig.effect_std.get(label, {})
         for parameter, given in effect["parameters"].items():
             name, value = f"{label}.{parameter}", abs(given)
-            std = spread.get(parameter, _KNOWN_SHARE * value)
+            std = spread.get(parameter, _UNSTATED_STD_SHARE * value)
             if name in known and math.isfinite(std) and std > 0.0:
                 out[name] = min(std, 2.0 * value) if value > 0.0 else std
     return out

@@ -29,8 +29,8 @@ _STATED_FREEDOM = 4.0
 # share of that variance that no curve tells: an error is no exact curve of one value (decision 95)
 _CURVE_REST = 0.02
 # shares of the usual error that are tried (decision 95)
-_SIZES = (0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0)
-LEAST_SIZE = _SIZES[0]  # share of the usual error that is hardly any
+_ERROR_SHARES = (0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0)
+LEAST_SIZE = _ERROR_SHARES[0]  # share of the usual error that is hardly any
 # spread of the logarithm of an error's size, a factor of three (decision 95)
 _SIZE_SPREAD = math.log(3.0)
 _MOST_EXPONENT = 700.0  # that a double's exponential bears
@@ -262,7 +262,7 @@ def error_sizes(
         sizes[block.name] = 1.0
         if rows:
             y, c, r = np.concatenate(rows), np.concatenate(bent), np.concatenate(rest)
-            each = {size: _evidence(y, c, r, size) for size in _SIZES}
+            each = {size: _evidence(y, c, r, size) for size in _ERROR_SHARES}
             sizes[block.name] = max(each, key=lambda size: each[size])
             evidence += each[sizes[block.name]]
     return sizes, evidence

@@ -9,9 +9,9 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 `suspected_units` (what recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`,
 `smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`,
 `available_blocks`, `Unjudged`, `unjudged_blocks` (blocks that the channels do not tell), `begun`,
-`change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
-(beginnings that nobody measured), `blocks_beside_tanks`, `unread_tanks`, `with_tanks`,
-`said_of_tanks` (tanks without a gauge, which are simulated), `own_of_rig`, `varying`,
+`change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`,
+`said_of_warm_starts` (beginnings that nobody measured), `blocks_beside_tanks`, `unread_tanks`,
+`with_tanks`, `said_of_tanks` (tanks without a gauge, which are simulated), `own_of_rig`, `varying`,
 `with_own_values`, `said_of_own` (values that are free in each recording).
 """
 
@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from pamrs.diagnosis.prepare._ambient import AMBIENT, AMBIENT_PRESSURE, at_ambient
 from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
-from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings
+from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings, said_of_warm_starts
 from pamrs.diagnosis.prepare._blocks import (
     Block,
     Residual,
@@ -89,6 +89,7 @@ __all__ = [
     "prepare",
     "residual",
     "said_of_beginnings",
+    "said_of_warm_starts",
     "said_of_own",
     "said_of_tanks",
     "smoothed",

@@ -4,9 +4,8 @@ A regulator whose outlet has no gauge begins a recording somewhere between what 
 is set to: at rest all three are the same, and a log that begins as a stopcock is opened has them
 bars apart. Along a tube of segments gas stands or flows: at rest its pressure is that of its ends,
 and a log that begins while air flows has a gradient there. What a block predicts from either tells
-the samples that depend on it; these are not judged. A gas with a balance of energy that is let
-out, or filled, as a log begins, is not as warm as the room: where it began is fitted. A joint
-begins at rest where that suits what follows better than the slope of its first samples.
+the samples that depend on it; these are not judged. A joint begins at rest where that suits what
+follows better than the slope of its first samples.
 """
 
 from __future__ import annotations
@@ -24,6 +23,7 @@ from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._blocks import (
     WINDOW_SAMPLES_PER_STATE,
     Block,
+    Residual,
     Tube,
     predicted,
     residual,
@@ -32,8 +32,6 @@ from pamrs.diagnosis.prepare._signals import Prepared
 from pamrs.errors import SimulationError
 from pamrs.rig.schema import qualified
 
-# Newton steps, of one number, to the temperature at which a gas begins that is not at rest
-_BEGUN_STEPS = 6
 # [noise levels] move of a sample by an unmeasured beginning: all move the same way (decision 92)
 _OUTLET_NOISES = 0.3
 # [delays of the tube] flow before a recording that begins not at rest, until it is steady
@@ -80,19 +78,13 @@ def begun_alike(
     Returns
     -------
     Prepared
-        With `unsettled`, the samples by the channel that each such block predicts, `temperatures`
-        at which gases began, and motions that begin `at_rest`.
+        With `unsettled`, the samples by the channel that each such block predicts, and motions that
+        begin `at_rest`.
     """
     beginnings = _Beginnings(blocks, core, prepared)
     counts = {block.channel: beginnings.remembered(block) for block in blocks}
     unsettled = {channel: count for channel, count in counts.items() if count > 0}
     prepared = replace(prepared, unsettled=unsettled) if unsettled else prepared
-    began = {
-        block.channel: _began_at(block, core, prepared, tolerances or {})
-        for block in blocks
-        if block.warm is not None
-    }
-    prepared = replace(prepared, temperatures=began) if began else prepared
     moving = [block for block in blocks if block.mechanical and block.window is not None]
     rests = [block.channel for block in moving if _rests(block, core, prepared, tolerances or {})]
     return replace(prepared, at_rest=frozenset(rests), _begun={}) if rests else prepared
@@ -134,42 +126,6 @@ def _left_at_first(
     rows = np.concatenate([found.value[:last] / found.noise, np.zeros(tol.size)])
     rows = rows - slopes @ np.linalg.lstsq(slopes, rows)[0]
     return float(rows @ rows)
-
-
-def _began_at(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances) -> float:
-    """Temperature at which a gas began [K], as a transient of its pressure tells by the nominal
-    model; that of the room where it stands still, began about as warm, or where values inside their
-    tolerances do as well.
-
-    A log that begins in a transient has a gas that was compressed or let out before. What that does
-    is not linear, so that the first windows begin where they tell, and are freed of the rest: a
-    pressure stands still on warm gas too, behind an open valve.
-    """
-    assert block.warm is not None
-    settings, rest = prepared.settings, block.warm[1]
-    early = 2 * WINDOW_SAMPLES_PER_STATE
-    rows = np.flatnonzero(prepared.recording.mask[block.channel][:early])
-    if rows.size < WINDOW_SAMPLES_PER_STATE:
-        return rest
-    if abs(_trend(prepared, block.channel, rows)) <= _STILL_DEVIATIONS:
-        return rest
-    found = rest
-    for _ in range(_BEGUN_STEPS):
-        there = replace(prepared, temperatures={block.channel: found})
-        try:
-            first = residual(block, core, there, [])
-        except SimulationError:
-            return rest
-        if not first.begun or first.starts[0][0] > 0 or first.begun[0].size < 2:
-            return rest  # nothing of it is seen
-        found = float(np.clip(found + first.begun[0][-1], 0.5 * rest, 2.0 * rest))
-    if abs(found - rest) <= settings.begun_temperature_error:
-        return rest
-    known: tuple[dict[str, float], ...] = ({}, {block.channel: found})
-    cold, warm = (
-        _left_at_first(block, core, replace(prepared, temperatures=t), tolerances) for t in known
-    )
-    return rest if cold - warm <= _STILL_DEVIATIONS**2 else found
 
 
 def _trend(prepared: Prepared, channel: str, rows: NDArray[np.intp]) -> float:
@@ -333,12 +289,37 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
             said.append(
                 f"block {block.name}: the first {told} were not judged: {_unmeasured(block)}"
             )
-        rest = block.warm[1] if block.warm is not None else math.nan
-        warm = {p.recording.name: p.temperatures.get(block.channel, rest) - rest for p in each}
-        told = ", ".join(f"{away:+.0f} K in {name}" for name, away in warm.items() if away)
-        if block.warm is not None and told:
+    return said
+
+
+def said_of_warm_starts(
+    blocks: Sequence[Block],
+    recordings: Sequence[Prepared],
+    found: Mapping[tuple[str, str], Residual],
+) -> list[str]:
+    """Gases that began clearly warmer or colder than the room, in words: a sentence for each block.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Those that are judged.
+    recordings : sequence of Prepared
+        Those of a case; one that is there twice counts once.
+    found : mapping
+        Residuals of the final model, by block and recording.
+    """
+    said = []
+    for block in blocks:
+        away = {
+            p.recording.name: (kelvin - block.warm.room, p.settings.begun_temperature_error)
+            for p in recordings
+            if (kelvin := found[block.name, p.recording.name].temperature) is not None
+            and block.warm is not None
+        }
+        clear = [f"{k:+.0f} K in {name}" for name, (k, least) in away.items() if abs(k) > least]
+        if clear:
             said.append(
                 f"block {block.name}: recordings begin in a transient; the temperature of the gas "
-                f"there is fitted, and differs from the room's by about {told}"
+                f"there is fitted, and differs from the room's by about {', '.join(clear)}"
             )
     return said

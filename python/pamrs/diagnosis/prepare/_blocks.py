@@ -25,6 +25,11 @@ from pamrs.simulation import default_step
 _ARM_WINDOW = 2.5
 _SUPPLY_WINDOW = 4.0  # [s] windows of a tank or a regulator
 _CHAMBER_WINDOW = 2.0  # [s] windows of a chamber that is fed; a sealed one is one window
+# standard deviations of an unmeasured start of a gas between what it can be at the most
+_START_DEVIATIONS = 4.0
+# repetitions of a prediction until the temperature at which its gas begins stands still
+_START_STEPS = 5
+_LEAST_PRESSURE_SHARE = 0.01  # share of the ambient pressure that a noisy gauge shows at the least
 # usable samples of a window for each state whose start is projected out, or it is not used
 WINDOW_SAMPLES_PER_STATE = 4
 # [s] longest step of joints and loads: an error of 0.03 noises, 0.17 at most (decision 57)
@@ -58,6 +63,41 @@ class Tube(NamedTuple):
     delay: float
 
 
+class WarmGas(NamedTuple):
+    """A gas with a temperature that nobody measured.
+
+    Attributes
+    ----------
+    channel : str
+        Of that temperature.
+    room, ambient : float
+        Temperature [K] and pressure [Pa] of the room.
+    exponent : float
+        ``1 - 1/kappa``: an adiabatic change of pressure by a factor r changes the temperature by
+        ``r**exponent``.
+    highest : float
+        Pressure that the chamber bears [Pa, gauge]; 0 where the rig file does not say.
+    """
+
+    channel: str
+    room: float
+    ambient: float
+    exponent: float
+    highest: float
+
+    def range_at(self, pressure: float, seen: float) -> tuple[float, float]:
+        """The coldest and warmest temperature that the gas can have [K]: expanded from the highest
+        pressure at once, or compressed from the ambient one.
+
+        ``pressure`` is where it is and ``seen`` the highest of the recording [Pa, gauge]; of a
+        chamber whose limit is not stated, twice that one counts.
+        """
+        now = max(self.ambient + pressure, _LEAST_PRESSURE_SHARE * self.ambient)
+        bears = max(self.highest, seen) if self.highest else 2.0 * seen + self.ambient
+        ratios = (now / (self.ambient + max(bears, pressure)), now / self.ambient, 1.0)
+        return self.room * min(ratios) ** self.exponent, self.room * max(ratios) ** self.exponent
+
+
 @dataclass(frozen=True)
 class Block:
     """A stretch of the chain with a measured output.
@@ -84,9 +124,8 @@ class Block:
         Tubes of segments that begin or end at it.
     thermometer : str
         Channel of the temperature at which its gas begins, where that is measured.
-    warm : tuple of (str, float) or None
-        Channel of the temperature of a gas that has one and no thermometer, and that of the room
-        [K], at which it begins at rest.
+    warm : WarmGas or None
+        The gas that it predicts, where that has a temperature and no thermometer.
     floating : tuple of str
         Drives that were simulated, since nobody measured them (a tank's pressure); their level and
         how far they fall are free in each recording.
@@ -106,7 +145,7 @@ class Block:
     tubes: tuple[Tube, ...] = ()
     thermometer: str = ""
     anchor: float | None = None
-    warm: tuple[str, float] | None = None
+    warm: WarmGas | None = None
     floating: tuple[str, ...] = ()
 
     @property
@@ -471,13 +510,18 @@ class _Map:
             warm=self.warm(name),
         )
 
-    def warm(self, name: str) -> tuple[str, float] | None:
-        """Channel of the temperature of a chamber's gas where it has a balance of energy and no
-        thermometer, and the temperature of the room.
-        """
+    def warm(self, name: str) -> WarmGas | None:
+        """A chamber's gas where it has a balance of energy and no thermometer."""
         if name in self.thermometers or self.rig.tables("chamber")[name]["gas"] != "energy_balance":
             return None
-        return dotted("temperature", name), float(self.rig.tables("gas")[""]["temperature"])
+        gas = self.rig.tables("gas")[""]
+        return WarmGas(
+            dotted("temperature", name),
+            float(gas["temperature"]),
+            float(gas["ambient_pressure"]),
+            1.0 - 1.0 / float(gas["heat_capacity_ratio"]),
+            float(self.rig.limits.get("max_pressure", 0.0)),
+        )
 
     def temperature(self, chamber: Block | Unjudged) -> Block | None:
         """The block of a gas whose temperature is measured: that of its pressure, read off by the
@@ -667,11 +711,12 @@ class Residual:
     noise : float
         Noise of the channel.
     starts : list of (a, b, q)
-        Windows with an orthonormal basis of what their start can do; what a residual without a
-        jacobian is freed of.
-    begun : list of array
-        How far each of them would begin from where it does, by what was measured in it, in the
-        order of the core; only of gases that are warm (`Block.warm`).
+        Windows with an orthogonal basis of what their start can do; what a residual without a
+        jacobian is freed of. A direction of length one is free, a shorter one held by a prior.
+    temperature : float or None
+        Temperature at which a gas without a thermometer begins [K].
+    strain : float
+        Squares of how far that is from the room's, in standard deviations of what it may be.
     """
 
     value: Array
@@ -680,7 +725,8 @@ class Residual:
     rows: NDArray[np.bool_]
     noise: float
     starts: list[tuple[int, int, Array]] = field(default_factory=list)
-    begun: list[Array] = field(default_factory=list)
+    temperature: float | None = None
+    strain: float = 0.0
 
     def freed(self, values: Array) -> Array:
         """Values (n,) without what the starts of windows can do, 0 in unusable rows."""
@@ -710,6 +756,8 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
     (n,) array
         In the channel's unit; 0 in unusable rows.
     """
+    if base.temperature is not None:
+        prepared = replace(prepared, temperatures={block.channel: base.temperature})
     prediction = predicted(block, core, prepared)
     measured = np.where(
         prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
@@ -742,9 +790,8 @@ def _warm(block: Block, prepared: Prepared) -> dict[str, tuple[Array, Array]]:
     """The temperature at which a gas without a thermometer begins, as one would read it there."""
     if block.warm is None:
         return {}
-    name, rest = block.warm
-    begins = prepared.temperatures.get(block.channel, rest)
-    return {name: (np.full(prepared.n, begins), np.zeros(prepared.n))}
+    begins = prepared.temperatures.get(block.channel, block.warm.room)
+    return {block.warm.channel: (np.full(prepared.n, begins), np.zeros(prepared.n))}
 
 
 def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
@@ -822,31 +869,99 @@ def _anchors(block: Block, prepared: Prepared, starts: list[int], lead: int = 0)
 
 
 def _shown(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
-    """What the start of a window can do, (n, k): of a pressure without the temperature at which its
-    gas began, once that is forgotten, or where it is known to have begun at rest; of a temperature
-    without where a thermometer stood that is not late.
+    """Columns of what the start of a window can do, (n, k): of a pressure without the temperature
+    at which its gas began once that is forgotten; of a temperature without where a thermometer
+    stood that is not late.
     """
-    noise, settings = prepared.noise[block.channel], prepared.settings
-    if block.warm is not None:
-        if at > 0 and not prepared.clear(block.drives)[at - 1]:
-            # what drove the gas in the hole before is not known
-            return start[:, start.any(axis=0)]
-        if block.channel not in prepared.temperatures:
-            return start[:, :-1]
-    elif not block.thermometer:
-        return start
-    if block.kind == "temperature":
+    # what drove a gas in a hole of the recording before is not known
+    hole = block.warm is not None and at > 0 and not prepared.clear(block.drives)[at - 1]
+    if hole or block.kind == "temperature":
         return start[:, start.any(axis=0)]
+    if block.warm is None and not block.thermometer:
+        return start
+    noise, settings = prepared.noise[block.channel], prepared.settings
     with np.errstate(over="ignore"):  # of a model that ran away, which no fit keeps
         told = float(np.linalg.norm(start[:, -1])) * settings.begun_temperature_error > noise
     return start if told else start[:, :-1]
 
 
-def _begun_off(triangle: Array, inside: Array) -> Array:
-    """How far a window would begin from where it does; nothing of a model that ran away."""
-    if not (np.isfinite(triangle).all() and np.isfinite(inside).all()):
-        return np.zeros(inside.size)
-    return np.asarray(np.linalg.pinv(triangle) @ inside, dtype=np.float64)
+@dataclass(frozen=True)
+class _GasStart:
+    """The temperature at which a gas without a thermometer begins, as physics bounds it [K].
+
+    Attributes
+    ----------
+    room, coldest, warmest : float
+        At rest, and what it can be.
+    std : float
+        Standard deviation before any data.
+    """
+
+    room: float
+    coldest: float
+    warmest: float
+    std: float
+
+    @classmethod
+    def of(cls, block: Block, prepared: Prepared) -> _GasStart | None:
+        """That of a block in a recording; None where it is measured, or there is none."""
+        if block.warm is None:
+            return None
+        pressures = [
+            block.channel,
+            *(n for n in block.drives if channel_of(n) == "supply_pressure"),
+        ]
+        there = [prepared.signals[n][0] for n in pressures if n in prepared.signals]
+        first = float(there[0][0])
+        bounds = block.warm.range_at(first, max(float(v.max()) for v in there))
+        wide = (bounds[1] - bounds[0]) / _START_DEVIATIONS
+        least = prepared.settings.begun_temperature_error
+        return cls(block.warm.room, *bounds, max(wide, least))
+
+
+class _FreedWindow(NamedTuple):
+    """A window freed of its start: directions that are taken out, what they take of the residual,
+    the temperature at which its gas begins [K], and how unlikely that is [standard deviations
+    squared].
+    """
+
+    basis: Array
+    taken: Array
+    begins: float | None = None
+    strain: float = 0.0
+
+
+def _freed_window(
+    columns: Array, value: Array, noise: float, gas: _GasStart | None, begins: float
+) -> _FreedWindow:
+    """A window's residual (n,) freed of what its start can do (n, k).
+
+    With a gas the last column is that of its temperature [1/K], of which the window begins at a
+    value: noise and a normal prior about the room's are whitened together, so that of an unlikely
+    start something stays in the residual; beyond what the temperature can be all of it stays.
+    """
+    free = columns if gas is None else columns[:, :-1]
+    q = np.linalg.qr(free)[0]
+    taken = q @ (q.T @ value)
+    if gas is None:
+        return _FreedWindow(q, taken)
+    column = columns[:, -1] - q @ (q.T @ columns[:, -1])
+    length = float(np.linalg.norm(column))
+    if not (0.0 < length < math.inf and math.isfinite(float(value @ value))):
+        return _FreedWindow(q, taken, begins)  # of a model that ran away
+    way, held = column / length, (noise / gas.std) ** 2
+    there = float(way @ (value - taken))
+    seen = there + length * (begins - gas.room)  # in the residual, from the room's temperature
+    wanted = gas.room + length * seen / (length**2 + held)
+    found = min(max(wanted, gas.coldest), gas.warmest)
+    past = seen - length * (found - gas.room)
+    left = math.copysign(math.hypot(past, (found - gas.room) * noise / gas.std), seen)
+    # how fast what is left grows with the residual
+    grows = past / left if left and found != wanted else held / (length**2 + held)
+    grows = grows if found != wanted else math.sqrt(held / (length**2 + held))
+    basis = np.column_stack([q, math.sqrt(max(0.0, 1.0 - grows)) * way])
+    strain = ((found - gas.room) / gas.std) ** 2
+    return _FreedWindow(basis, taken + (there - left) * way, found, strain)
 
 
 def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array) -> list[Array]:
@@ -891,6 +1006,58 @@ def _own(core: _core.Rig, prepared: Prepared) -> list[str]:
     return [n for n, own in given if own.error == "own" and n in core.parameter_names]
 
 
+def _with_slopes(
+    block: Block, core: _core.Rig, prepared: Prepared, starts: list[int], names: list[str]
+) -> tuple[Array, Array]:
+    """A block's output over a recording (n,), and its derivatives with respect to parameters and to
+    the states in which its windows start (n, k).
+    """
+    prediction, jacobian = core.predict(
+        block.name,
+        prepared.driving(mechanical=block.mechanical),
+        prepared.dt,
+        default_step(prepared.dt, longest=block.step),
+        starts,
+        names,
+        begun(block, prepared, starts),
+        prepared.n,
+        anchors=_anchors(block, prepared, starts),
+    )
+    if jacobian is None:
+        raise AssertionError("the core returns a jacobian when parameters are named")
+    return prediction, jacobian
+
+
+def _from_its_start(
+    block: Block, core: _core.Rig, prepared: Prepared, starts: list[int], names: list[str]
+) -> tuple[Prepared, Array, Array]:
+    """The same with a gas that begins as warm as its pressure and a prior say, and the recording
+    with that temperature: steps of Gauss and Newton in it.
+    """
+    gas = _GasStart.of(block, prepared)
+    found = _with_slopes(block, core, prepared, starts, names)
+    if gas is None:
+        return prepared, *found
+    first = slice(starts[0], [*starts[1:], prepared.n][0])
+    rows = prepared.usable(block.channel, block.drives, starts)[first]
+    measured = np.where(rows, prepared.recording.channels[block.channel][first], 0.0)
+    begins = gas.room
+    for _ in range(_START_STEPS):
+        prediction, jacobian = found
+        start = np.where(rows[:, None], jacobian[first, len(names) :], 0.0)
+        columns = _shown(block, start, starts[0], prepared)
+        value = np.where(rows, measured - prediction[first], 0.0)
+        if columns.shape[1] < 2 or not np.isfinite(value).all():
+            break  # nothing of it is seen
+        wanted = _freed_window(columns, value, prepared.noise[block.channel], gas, begins).begins
+        if wanted is None or abs(wanted - begins) <= prepared.settings.begun_temperature_error:
+            break  # so far it is linear
+        begins = wanted
+        prepared = replace(prepared, temperatures={block.channel: begins})
+        found = _with_slopes(block, core, prepared, starts, names)
+    return prepared, *found
+
+
 def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:
     """Predict a block's output over a recording and compare.
 
@@ -916,19 +1083,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
             core.parameter_names[0],
         )
     ]
-    prediction, jacobian = core.predict(
-        block.name,
-        prepared.driving(mechanical=block.mechanical),
-        prepared.dt,
-        default_step(prepared.dt, longest=block.step),
-        starts,
-        names,
-        begun(block, prepared, starts),
-        prepared.n,
-        anchors=_anchors(block, prepared, starts),
-    )
-    if jacobian is None:
-        raise AssertionError("the core returns a jacobian when parameters are named")
+    prepared, prediction, jacobian = _from_its_start(block, core, prepared, starts, names)
     free = jacobian[:, [names.index(n) for n in own]].T.copy()
     for name, there in prepared.recording.parameters.items():
         if name in parameters:
@@ -945,7 +1100,9 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     shifted = prediction.copy()
     k = len(names)
     bases: list[tuple[int, int, Array]] = []
-    moved: list[Array] = []
+    gas = _GasStart.of(block, prepared)
+    begins = prepared.temperatures.get(block.channel, gas.room) if gas else 0.0
+    begun_at, strain = (begins if gas else None), 0.0
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
         slopes = jacobian[a:b, :k]
         start = _shown(block, jacobian[a:b, k:], a, prepared)
@@ -954,14 +1111,14 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
             value[a:b] = 0.0
             slopes[:] = 0.0
             continue
-        q, triangle = np.linalg.qr(start)
-        bases.append((a, b, q))
-        inside = q.T @ value[a:b]
-        moved.append(_begun_off(triangle, inside) if block.warm is not None else inside[:0])
-        correction = q @ inside
-        value[a:b] -= correction
-        shifted[a:b] += correction
-        slopes -= q @ (q.T @ slopes)
+        own_gas = gas if a == starts[0] and start.shape[1] > 1 else None
+        freed = _freed_window(start, value[a:b], noise, own_gas, begins)
+        bases.append((a, b, freed.basis))
+        value[a:b] -= freed.taken
+        shifted[a:b] += freed.taken
+        slopes -= freed.basis @ (freed.basis.T @ slopes)
+        strain += freed.strain
+        begun_at = freed.begins or begun_at
     every = [*_levels(block, core, prepared, prediction), *free]
     of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], bases)
     if of_recording.size:
@@ -973,4 +1130,4 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     jac = jacobian[:, : len(parameters)] if parameters else None
     # a whole recording is shown from its measured start; a window from the start that suits it best
     shown = prediction if block.window is None else shifted
-    return Residual(value, jac, shown, rows, noise, bases, moved)
+    return Residual(value, jac, shown, rows, noise, bases, begun_at, strain)

@@ -30,7 +30,7 @@ _PEAK_RATIO = 1.5
 # correlation of a window's noise with the other's from which it is shared: copies 1, chance 0.1
 _FOLLOW_SHARE = 0.5
 # the same of most shared windows; below it own noise covers the copy, all that meets is shared
-_CLEAR_SHARE = 0.75
+_CLEAN_COPY_SHARE = 0.75
 # the same in chance deviations, of windows with few samples: some 1e-5 for a window
 _CHANCE_SHARE = 4.5
 # converter step over noise, rounding included, that a repetition repeats (decision 111)
@@ -425,7 +425,7 @@ def _by_window(a: _Channel, b: _Channel) -> tuple[Mask, Mask, bool]:
     says = alive > _LEAST_ALIVE
     chance = _CHANCE_SHARE / np.sqrt(np.maximum(alive * WINDOW_SAMPLES, 1.0))
     alike = says & (share > np.maximum(_FOLLOW_SHARE, chance))
-    clear = bool(alike.any()) and float(np.median(share[alike])) > _CLEAR_SHARE
+    clear = bool(alike.any()) and float(np.median(share[alike])) > _CLEAN_COPY_SHARE
     return alike, says & (share <= _FOLLOW_SHARE), clear
 
 

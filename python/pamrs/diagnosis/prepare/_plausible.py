@@ -31,7 +31,7 @@ from pamrs.rig import Rig
 from pamrs.units import in_words
 
 # [Pa] gauge pressure that a channel exceeds somewhere: bar under a heading in Pa does not
-_LEAST_PRESSURE = 100.0
+_LEAST_PEAK_PRESSURE = 100.0
 # [Pa] no pressure is lower: a vacuum is at -101 kPa, and a transducer errs
 _LEAST_GAUGE_PRESSURE = -1.1e5
 # multiple of the largest pressure of the rig file that is allowed above that
@@ -82,7 +82,7 @@ Array = NDArray[np.float64]
 
 _PRESSURES = with_trait("pressure")
 _DEGREES = 180.0 / math.pi  # of a radian
-_TOLD = 12
+_MOST_ITEMS = 12
 """Findings that a message lists."""
 
 
@@ -118,8 +118,8 @@ def check_plausible(
 def _refuse(case: str, found: list[str]) -> None:
     if not found:
         return
-    told = found[:_TOLD] + (
-        [f"and {len(found) - _TOLD} more of this kind"] if len(found) > _TOLD else []
+    told = found[:_MOST_ITEMS] + (
+        [f"and {len(found) - _MOST_ITEMS} more of this kind"] if len(found) > _MOST_ITEMS else []
     )
     raise DiagnosisError(
         joined(f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", told)
@@ -239,8 +239,10 @@ def _lost(
 def _when(bad: NDArray[np.bool_], recording: Recording) -> str:
     """The first stretches in which something is, in seconds."""
     pairs = stretches(bad)
-    told = [f"{recording.time[a]:.4g} to {recording.time[b - 1]:.4g} s" for a, b in pairs[:_TOLD]]
-    more = f" and {len(pairs) - _TOLD} more stretches" if len(pairs) > _TOLD else ""
+    told = [
+        f"{recording.time[a]:.4g} to {recording.time[b - 1]:.4g} s" for a, b in pairs[:_MOST_ITEMS]
+    ]
+    more = f" and {len(pairs) - _MOST_ITEMS} more stretches" if len(pairs) > _MOST_ITEMS else ""
     return ", ".join(told) + more
 
 
@@ -290,11 +292,11 @@ def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> I
         ):
             continue
         high = float(np.quantile(np.abs(values), 0.995))
-        if 0.0 < high < _LEAST_PRESSURE and np.ptp(values) > 0.0:
+        if 0.0 < high < _LEAST_PEAK_PRESSURE and np.ptp(values) > 0.0:
             yield (
                 f"{name} never exceeds {_told(recording, name, high)} gauge; a pressure of air "
-                f"exceeds {_told(recording, name, _LEAST_PRESSURE)} somewhere: are its values in "
-                "bar (or is it another column, an angle or a voltage) under a heading in Pa?"
+                f"exceeds {_told(recording, name, _LEAST_PEAK_PRESSURE)} somewhere: are its values "
+                "in bar (or is it another column, an angle or a voltage) under a heading in Pa?"
             )
         elif high > top:
             yield (

@@ -103,13 +103,13 @@ def _sentence(
     else:
         value = f"{rail:.6g} {next(r.units.get(channel, 'SI') for r in recordings)}"
     counted = [f"{count} in {name}" for name, count in counts.items()]
-    more = len(counted) - _TOLD
-    told = ", ".join(counted[:_TOLD]) + f" and more in {more} others" * (more > 0)
+    more = len(counted) - _MOST_COUNTED
+    told = ", ".join(counted[:_MOST_COUNTED]) + f" and more in {more} others" * (more > 0)
     return (
         f"{channel} is clipped: its sensor's range ends at {value}; samples there, and "
         f"their neighbours, were masked in all recordings ({told})"
     )
 
 
-_TOLD = 6
+_MOST_COUNTED = 6
 """Recordings whose samples are counted."""

@@ -36,7 +36,7 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS
 
-_MOST_SIZE = 8.0  # [typical sizes] largest size at which a linear gain is relied on (decision 13)
+_MOST_LINEAR = 8.0  # [typical sizes] largest size at which a linear gain is relied on (decision 13)
 # [typical sizes] smallest start: a compressor may deliver 500 times less (decision 20)
 _LEAST_SIZE = 0.002
 # [sizes tried] size below which (and from most_size) the signature is taken again there
@@ -169,8 +169,8 @@ def _best_size(along: float, power: float, start: Start) -> tuple[float, float]:
     """
     if power < _INVISIBLE:
         return 0.0, 0.0
-    low = -_MOST_SIZE if start.signed else _LEAST_SIZE
-    size = float(np.clip(-along / power, low, _MOST_SIZE)) if start.scalable else 1.0
+    low = -_MOST_LINEAR if start.signed else _LEAST_SIZE
+    size = float(np.clip(-along / power, low, _MOST_LINEAR)) if start.scalable else 1.0
     return size, -2.0 * size * along - size**2 * power
 
 
@@ -380,7 +380,7 @@ class _Looking:
 
     def _about_this_size(self, score: Score) -> bool:
         """Whether a signature says that its effect has about the size at which it was taken."""
-        return _REPEAT_BELOW <= abs(score.size) < _MOST_SIZE
+        return _REPEAT_BELOW <= abs(score.size) < _MOST_LINEAR
 
     def _taken(self, entry: Signature) -> float:
         """What a start takes of the chi-square at its own size."""

@@ -2,7 +2,7 @@
 
 Public: `examine` (all of it, for some blocks), `Mismatch`, `refitted`, `with_autocorrelation` (the
 baseline alone), `find_misread`, `Reading`, `reading_errors` (other units of channels),
-`find_closure`, `free_suspects`, `find_wrong_values`, `suspects_at_wall`.
+`find_closure`, `free_suspects`, `find_wrong_values`, `suspected_values`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pamrs.diagnosis.search._readings import Reading, find_misread, reading_erro
 from pamrs.diagnosis.search._wrong_parameters import (
     find_wrong_values,
     free_suspects,
-    suspects_at_wall,
+    suspected_values,
 )
 
 __all__ = [
@@ -27,6 +27,6 @@ __all__ = [
     "find_misread",
     "reading_errors",
     "refitted",
-    "suspects_at_wall",
+    "suspected_values",
     "with_autocorrelation",
 ]

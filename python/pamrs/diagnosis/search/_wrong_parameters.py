@@ -1,8 +1,8 @@
 """Values of the rig file that are wrong: parameters freed from their tolerance, as rivals of the
 effects.
 
-The baseline moves inside three tolerances. A parameter that ends at that wall may stand for physics
-that is missing, or the file may be wrong about it. Which of the two is decided as between effects:
+The baseline moves inside three tolerances. A parameter that moved may stand for physics that is
+missing, or the file may be wrong about it. Which of the two is decided as between effects:
 the parameter is freed, everything is fitted again, and held-out recordings judge.
 """
 
@@ -20,6 +20,7 @@ from pamrs.diagnosis.evidence import WALL_TOLERANCES, Attempts, BlockGroup, Cand
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
+    ends_in_tolerances,
     known_parameters,
     levenberg_marquardt,
     stacked,
@@ -41,6 +42,7 @@ _LEAST_PREDICTED_GAIN = 9.2
 _MOST_FINISHED = 3
 # times the misfit of a freed parameter that leaves noise, for others fitted beside it
 _NEAR_MISFIT = 2.0
+_SUSPECTED_TOLERANCES = 1.0  # [tolerances] moved by a value whose freeing is looked at
 # [tolerances] moved by a suspect beside effects, which take a part of what it would do
 _FAR_TOLERANCES = 2.0
 _MOST_BESIDE = 2  # parameters at their wall that are freed beside the effects that leave least
@@ -59,8 +61,9 @@ _WRONG_TOGETHER = (
 Array = NDArray[np.float64]
 
 
-def suspects_at_wall(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
-    """Parameters at their wall, alone and in pairs that one mistake makes wrong together.
+def suspected_values(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
+    """Parameters that moved, alone, and in pairs that one mistake makes wrong together: of several
+    that moved a little one may be far off.
 
     Parameters
     ----------
@@ -74,8 +77,9 @@ def suspects_at_wall(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
     list of tuple of str
         Dotted names.
     """
-    at_wall = [name for name, moved in fitted.moved.items() if abs(moved) >= WALL_TOLERANCES]
-    found: list[tuple[str, ...]] = [(name,) for name in at_wall]
+    moved = [name for name, own in fitted.moved.items() if abs(own) >= _SUSPECTED_TOLERANCES]
+    at_wall = [name for name in moved if abs(fitted.moved[name]) >= WALL_TOLERANCES]
+    found: list[tuple[str, ...]] = [(name,) for name in moved]
     for one, other in itertools.permutations(fitted.moved, 2):
         together = any({one, other} <= block.parameters for block in blocks) and _same_owner(
             one, other
@@ -114,8 +118,8 @@ def free_suspects(
     by the linear model.
 
     Where the mismatch is large its autocorrelation leaves little weight to the recordings, so that
-    the priors hold what a fit with white noise moved to its wall: parameters at their wall in
-    either fit are suspects.
+    the priors hold what a fit with white noise moved: parameters that moved in either fit are
+    suspects.
 
     Parameters
     ----------
@@ -135,11 +139,11 @@ def free_suspects(
     suspects = [
         names
         for found in (baseline, first)
-        for names in suspects_at_wall(found, trial.inner.blocks)
+        for names in suspected_values(found, trial.inner.blocks)
     ]
     gains = _worth_a_fit(trial, baseline, list(dict.fromkeys(suspects)), trial.white)
-    # the linear model says little of what is far away: each parameter at its wall is fitted,
-    # whatever its predicted gain beside others
+    # the linear model says little of what is far away: each parameter is fitted, whatever its
+    # predicted gain beside others
     least = _PAIR_SHARE * max(gains.values(), default=0.0)
     pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][
         :_MOST_PAIRS
@@ -246,10 +250,8 @@ def _predicted_gain(
     slopes, left = triangle[:, :-1], triangle[:, -1]
     begin = np.array([baseline.moved[n] for n in names])
     known = known_parameters(nominal)
-    low, high = (
-        np.array([(getattr(known[n], end) - known[n].value) / known[n].tol for n in names])
-        for end in ("lower", "upper")
-    )
+    ends = [ends_in_tolerances(known[n], math.inf) for n in names]
+    low, high = np.array(ends).T
 
     def cost(loose: tuple[str, ...]) -> float:
         bound = np.array([n not in loose for n in names], dtype=np.float64)
@@ -274,10 +276,10 @@ def _predicted_gain(
 
 
 def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], None]) -> BlockGroup:
-    """A group whose baseline leaves only noise, but needs a parameter at its wall for it: which one
-    the file is wrong about.
+    """A group whose baseline leaves only noise, but moves parameters for it: which one the file is
+    wrong about.
 
-    Each parameter at its wall is freed. What speaks for it is what misfit and priors lose together,
+    Each that promises it is freed. What speaks for it is what misfit and priors lose together,
     weighed against the odds of a file that is so wrong.
     """
     start = quiet.candidates[0]
