@@ -50,7 +50,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
         test-python-all wheel wheel-test snapshots hostile logs fuzz deny format bench convergence recruitment \
-        docs effects reproduce example golden lock clean
+        docs effects reference reproduce example golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -195,6 +195,9 @@ docs: build $(VENV)/.docs  ## the site, its tutorials run, to out/site/index.htm
 	@rm -rf out/site out/docs-pages docs/reference/api
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html -d out/docs-pages docs out/site
 	@echo "written: out/site/index.html"
+
+reference: build  ## the tables of docs/reference: commands, keys, channels, units, settings, files
+	$(BIN)/python docs/_site/made_reference.py
 
 effects: build  ## a page of every effect of the catalogue, its fingerprint drawn by the simulator
 	$(BIN)/python -m fingerprints docs/effects

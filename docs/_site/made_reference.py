@@ -1,5 +1,6 @@
-"""Pages of the reference, made from the package: commands, keys of rig files, channels, units,
-settings, files. Each directive writes Markdown, and the page around it has the words.
+"""Tables of the reference, made from the package: commands, keys of rig files, channels, units,
+settings, files. Each stands in a page between two marks, and the page around it has the words;
+``make reference`` writes them anew.
 """
 
 import dataclasses
@@ -8,6 +9,8 @@ import itertools
 import math
 import re
 from pathlib import Path
+
+REFERENCE = Path(__file__).parents[1] / "reference"
 
 
 def cell(text):
@@ -97,7 +100,8 @@ def channels():
     lines = []
     for name, one in CHANNELS.items():
         ends = [number(end) for end in (one.lower, one.upper) if math.isfinite(end)]
-        lines.append((f"`{name}`", one.unit, laboratory_unit(name), one.block, " to ".join(ends)))
+        read = laboratory_unit(name)[0]
+        lines.append((f"`{name}`", one.unit, read, one.block, " to ".join(ends)))
     yield from rows(["channel", "SI", "in texts and pictures", "block", "allowed (SI)"], lines)
 
 
@@ -177,19 +181,17 @@ MADE = {
 }
 
 
-def directive(made):
-    """A directive that puts the Markdown of a function into its page."""
-    from sphinx.util.docutils import SphinxDirective
-
-    class Made(SphinxDirective):
-        """Content from the package."""
-
-        def run(self):
-            """The nodes of it."""
-            text = "\n".join(made())
-            return self.parse_text_to_nodes(text, allow_section_headings=True)
-
-    return Made
+def made_pages():
+    """Every page of the reference by its file, the parts between its marks made anew."""
+    for page in sorted(REFERENCE.glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        for name, made in MADE.items():
+            first, last = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+            if first in text:
+                head, rest = text.split(first)
+                table = "\n".join(made()).strip()
+                text = f"{head}{first}\n{table}\n\n{last}{rest.split(last)[1]}"
+        yield page, text
 
 
 def check_servers(app, error):
@@ -209,7 +211,10 @@ def check_servers(app, error):
 
 def setup(app):
     """Called by Sphinx."""
-    for name, made in MADE.items():
-        app.add_directive(name, directive(made))
     app.connect("build-finished", check_servers)
     return {"parallel_read_safe": True}
+
+
+if __name__ == "__main__":
+    for file, whole in made_pages():
+        file.write_text(whole, encoding="utf-8")

@@ -12,7 +12,23 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from pamrs import fit, library, rigs, sweeps
+    from pamrs import (
+        channels,
+        control,
+        design,
+        diagnosis,
+        effects,
+        errors,
+        experiments,
+        fit,
+        library,
+        recordings,
+        report,
+        rigs,
+        simulation,
+        sweeps,
+        units,
+    )
     from pamrs.design import sizing
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
@@ -66,7 +82,14 @@ __all__ = [
     "SimulationError",
     "Simulator",
     "__version__",
+    "channels",
+    "control",
+    "design",
     "diagnose",
+    "diagnosis",
+    "effects",
+    "errors",
+    "experiments",
     "fit",
     "library",
     "load_case",
@@ -74,18 +97,20 @@ __all__ = [
     "load_result",
     "load_rig",
     "plan_diagnosis",
+    "recordings",
+    "report",
     "rigs",
     "simulate",
     "simulate_batch",
+    "simulation",
     "sizing",
     "sweep",
     "sweeps",
+    "units",
 ]
 
-_MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs", "sweeps")} | {
-    "sizing": "pamrs.design.sizing"
-}
 _NAMES: Final = {
+    "design": ("sizing",),
     "diagnosis": ("diagnose",),
     "diagnosis.next_experiment": ("Plan", "plan_diagnosis"),
     "diagnosis.result": ("Diagnosis", "load_result"),
@@ -135,10 +160,10 @@ def __getattr__(name: str) -> Any:
         value: Any = _version()
     elif name == "_core":
         value = _compiled()
-    elif name in _MODULES:
-        value = importlib.import_module(_MODULES[name])
     elif name in _HOMES:
         value = getattr(importlib.import_module(_HOMES[name]), name)
+    elif name in __all__:
+        value = importlib.import_module(f"pamrs.{name}")
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

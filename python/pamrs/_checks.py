@@ -59,8 +59,40 @@ def as_column(name: str, values: Any) -> NDArray[np.float64]:
     """An array of one dimension, with one number at least."""
     column = as_numbers(name, values).copy()
     if column.ndim != 1 or column.size == 0:
-        raise ParameterError(f"{name} has the shape {column.shape}; (n,) with n >= 1 is needed")
+        raise misshapen(name, column.shape)
     return column
+
+
+def misshapen(
+    name: str, shape: tuple[int, ...], rows: int | None = None, each: str = ""
+) -> ParameterError:
+    """The error for an array that is no row of numbers: of how many, as many as it is long where
+    nothing else says it, and behind that what ``each`` of them is.
+    """
+    count = max(shape, default=0) if rows is None else rows
+    needed = f"({count},)" if count else "(n,) with n >= 1"
+    return ParameterError(f"{name} has the shape {shape}; {needed} is needed{each and ', '}{each}")
+
+
+def matched(**given: Any) -> tuple[NDArray[np.float64], ...]:
+    """Finite numbers by the names of their arguments, brought to one shape; a number goes with an
+    array of any.
+    """
+    import numpy as np
+
+    arrays = {name: as_numbers(name, values) for name, values in given.items()}
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
+            value = array[~np.isfinite(array)][0]
+            raise refused(name, value, "finite numbers are needed")
+    try:
+        return tuple(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = {name: array.shape for name, array in arrays.items() if array.ndim}
+        raise ParameterError(
+            f"{' and '.join(shapes)} have the shapes {' and '.join(map(str, shapes.values()))}; "
+            "one shape for all is needed"
+        ) from None
 
 
 def contraction_of(contraction: Any, length: Any, rest_length: float) -> Any:
@@ -292,8 +324,10 @@ def whole(name: str, value: Any, least: int = 0, most: int | None = None) -> int
     return int(value)
 
 
-def rising(name: str, given: Any) -> tuple[float, float]:
-    """Two rising finite numbers.
+def rising(
+    name: str, given: Any, lower: float = -math.inf, upper: float = math.inf, unit: str = ""
+) -> tuple[float, float]:
+    """Two rising finite numbers, within bounds in a unit.
 
     Raises
     ------
@@ -304,8 +338,9 @@ def rising(name: str, given: Any) -> tuple[float, float]:
         low, high = map(_number, given)
     except (TypeError, ValueError):
         low = high = math.nan
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise refused(name, given, "two rising finite numbers are needed")
+    if not (math.isfinite(low) and math.isfinite(high) and lower <= low < high <= upper):
+        ends = with_unit(f" from {lower:g} to {upper:g}", unit) if upper < math.inf else ""
+        raise refused(name, given, f"two rising finite numbers{ends} are needed")
     return low, high
 
 
@@ -361,8 +396,23 @@ def checked_number(
     if not (math.isfinite(number) and lower <= number <= upper) or (
         whole and not number.is_integer()
     ):
-        raise ParameterError(f"{name} = {number:g}{last} is not allowed: {allowed}")
+        meant = angle_meant(name, number, lower, upper) if unit == "rad" else ""
+        raise ParameterError(f"{name} = {number:g}{last} is not allowed: {allowed}{meant}")
     return number
+
+
+#: What an angle is measured from, where others measure from the line at right angles to it.
+_ZEROS: Final = {"braid_angle": "the circumference"}
+
+
+def angle_meant(name: str, angle: float, lower: float, upper: float) -> str:
+    """What a refused angle [rad] was likely meant as, in words that go behind the refusal: degrees,
+    or the angle from the other line; empty where neither is allowed.
+    """
+    zero, degrees = _ZEROS.get(name.rpartition(".")[2], ""), math.radians(angle)
+    others = (0.5 * math.pi - angle, 0.5 * math.pi - degrees) if zero else ()
+    likely = [f"{math.degrees(x):.4g} deg?" for x in (degrees, *others) if lower <= x <= upper]
+    return "".join([f", measured from {zero}" * bool(zero), *(f"; {one}" for one in likely[:1])])
 
 
 def check_column(

@@ -8,7 +8,9 @@ import logging
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Final
 
 LOG: Final = logging.getLogger("pamrs")
@@ -119,6 +121,34 @@ class Steps:
         # outside of the lock, since whoever gets a line may wait for another thread
         LOG.info("%s", line.whole)
         self._to(line)
+
+
+@contextmanager
+def at_even_times(
+    text: str, tell: Callable[[str], object], seconds: float
+) -> Iterator[Callable[[str], None]]:
+    """Tell every so many seconds how far a work is, whether it says something just then or not;
+    what it gives takes the lines of the work.
+    """
+    began, said, ended = time.monotonic(), deque([text], maxlen=1), threading.Event()
+
+    def go_on() -> None:
+        while not ended.wait(seconds):
+            passed, line = time.monotonic() - began, said[-1]
+            share = getattr(line, "share", None)
+            if share is None:
+                tell(f"{line}: {duration_words(passed)} so far")
+                continue
+            left = passed * (1.0 - share) / share if share >= _LEAST_SHARE else None
+            tell(Line(line, share, left).whole)
+
+    thread = threading.Thread(target=go_on, daemon=True)
+    thread.start()
+    try:
+        yield said.append
+    finally:
+        ended.set()
+        thread.join()
 
 
 def receiver(given: Callable[[str], object] | None) -> Callable[[str], object]:

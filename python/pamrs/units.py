@@ -25,6 +25,7 @@ __all__ = [
     "Unit",
     "bar_and_psi",
     "from_si",
+    "in_words",
     "measured_from",
     "parse_unit",
     "same_dimension",
@@ -400,6 +401,36 @@ def with_unit(number: str, unit: str) -> str:
     ('1.5 bar', '0.005')
     """
     return number if unit in ("", "1", "-") else f"{number} {unit}"
+
+
+def in_words(unit: str, dimension: str, *values: float, digits: str = ".4g") -> str:
+    """SI values in the unit that a log or a file has.
+
+    Parameters
+    ----------
+    unit : str
+        The unit as it is written there; what it says that a pressure is measured from is left out.
+        Empty for that of SI.
+    dimension : str
+        As for :func:`to_si`.
+    *values : float
+        In SI; gauge pressures.
+    digits : str, optional
+        How numbers are formatted.
+
+    Returns
+    -------
+    str
+        The number with its unit, of two the range.
+
+    Examples
+    --------
+    >>> in_words("bar(a)", "pressure", 2e5), in_words("", "Pa", 0.0, 2e5)
+    ('2 bar', '0 to 2e+05 Pa')
+    """
+    alone = measured_from(unit)[0] or DIMENSIONS.get(dimension, dimension)
+    numbers = [f"{from_si(value, alone, dimension):{digits}}" for value in values]
+    return with_unit(" to ".join(numbers), alone)
 
 
 def bar_and_psi(pressure: float) -> str:

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from pamrs import Joint, library, rigs
-from pamrs.cli import design as cli_design
+from pamrs.cli._shared import counted
 from pamrs.rig import parse_rig
 from tests.scripts import command
 from tests.tables import rows_of
@@ -104,12 +104,11 @@ def test_wrong_input_is_named(capsys, changes, more, part):
     assert part in err
 
 
-def test_the_bar_is_shown_to_a_person_only(capsys, monkeypatch):
-    with cli_design._bar("runs") as progress:
-        assert progress is None
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with cli_design._bar("runs") as progress:
-        progress(1, 2)
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert "runs" in captured.err
+def test_a_short_count_is_shown_to_a_person_only(capsys, monkeypatch):
+    for person in (False, True):
+        monkeypatch.setattr("sys.stderr.isatty", lambda person=person: person)
+        with counted("designs") as done:
+            done(1, 2)
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert ("designs" in captured.err) == person

@@ -2,13 +2,16 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
+import threading
 
 import pytest
 import typer
 
 from pamrs import cli, library, rigs
+from pamrs._progress import Line
 from pamrs.cli import _shared
 from pamrs.effects import CATALOGUE
 from tests.cli.test_terminal import Terminal
@@ -73,6 +76,41 @@ def test_a_plain_terminal_gets_plain_lines(monkeypatch, name, value, plain):
         pass
     assert ("\x1b" not in terminal.getvalue()) == plain
     assert "working: done" in terminal.getvalue()
+
+
+def test_where_nobody_is_looking_lines_come_at_even_times(monkeypatch):
+    """With share and time left, also while the work itself says nothing."""
+    said, known = list[str](), threading.Event()
+
+    def note(text: str) -> None:
+        said.append(text)
+        if len(said) > 4:
+            known.set()
+
+    assert _shared._EVERY == 10.0
+    monkeypatch.setattr(_shared, "_EVERY", 1e-3)
+    monkeypatch.setattr(_shared, "note", note)
+    with _shared.progress("diagnosing run") as say:
+        say(Line("run: refit", 0.25))
+        assert known.wait(60.0)
+    first, *between, last = said
+    assert (first, last[:20]) == ("diagnosing run ...", "diagnosing run: done")
+    told = [line for line in between if "refit" in line]
+    assert all(re.fullmatch(r"25 %, about \d+ s left: run: refit", line) for line in told)
+    assert len(told) > 1
+    assert all(line.startswith("diagnosing run: 0 s so far") for line in between[: -len(told)])
+
+
+def test_a_quiet_command_says_nothing_between(monkeypatch):
+    said = list[str]()
+    monkeypatch.setattr(_shared, "_EVERY", 1e-3)
+    monkeypatch.setattr(_shared.typer, "echo", lambda text, err: said.append(text))
+    quiet = _shared.QUIET.set(True)
+    before = threading.active_count()
+    with _shared.progress("diagnosing run"):
+        assert threading.active_count() == before
+    _shared.QUIET.reset(quiet)
+    assert not said
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -121,7 +121,7 @@ def test_bad_input_is_named():
         ("at = 9", lambda: tr.step(0.0, 1.0, at=9.0)),
         ("cycles", lambda: tr.cosine_cycles(0.2, 1.0, cycles=0)),
         ("bias", lambda: tr.compound(bias=math.inf)),
-        ("n >= 5", lambda: tr.from_samples([0, 1, 2], [0, 1, 2])),
+        ("3 samples; 5", lambda: tr.from_samples([0, 1, 2], [0, 1, 2])),
         (r"time\[2\]", lambda: tr.from_samples([0, 1, 1, 2, 3], [0, 1, 2, 3, 4])),
         ("smoothing", lambda: tr.from_samples(range(5), range(5), smoothing=-1.0)),
         ("time", lambda: tr.step(0.0, 1.0)(math.nan)),

@@ -149,8 +149,11 @@ MUSCLE, SUPPLY, ANGLE, VALVE = "muscle_pressure", "supply_pressure", "joint_angl
 REFUSED = {
     "bar under Pa": (put(MUSCLE, lambda p: p / 1e5), "muscle_pressure never exceeds .* bar"),
     "Pa under bar": (same, "muscle_pressure.*not possible.*unit"),
-    "kPa under bar": (put(MUSCLE, lambda p: p / 1e3), "muscle_pressure reaches .* kPa"),
-    "psi under bar": (put(SUPPLY, lambda p: p / 6894.76), "supply_pressure reaches .* psi"),
+    "kPa under bar": (
+        put(MUSCLE, lambda p: p / 1e3),
+        r"muscle_pressure reaches \S+ bar gauge; at most \S+ bar is .* kPa",
+    ),
+    "psi under bar": (put(SUPPLY, lambda p: p / 6894.76), r"supply_pressure reaches \S+ bar gauge"),
     "both in psi under bar": (in_psi, "read as psi it reaches"),
     "rad under deg": (same, "joint_angle .*(deg or rad|rad under a heading in deg)"),
     "deg under rad": (put(ANGLE, np.degrees), "joint_angle.*(deg or rad|right column and unit)"),

@@ -18,7 +18,7 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import BlockGroup, Judged
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _choice, measurable, propose
-from pamrs.diagnosis.next_experiment._asked import _pair, _Question, _telling
+from pamrs.diagnosis.next_experiment._asked import _measured, _pair, _Question, _telling
 from pamrs.diagnosis.next_experiment._choice import entropy, outcome_of
 from pamrs.diagnosis.next_experiment._differences import (
     linear,
@@ -322,3 +322,24 @@ def test_a_pair_that_nothing_simulates_is_told_in_words(driven: bool) -> None:
     assert "arm of elbow" in told.text
     # of two chains that move the joint the first one is moved
     assert (told.experiment, told.noises) == ("nested_triangles.flexor" if driven else "", None)
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        (["sensors.pressure_zero"], "pressure zero of the sensors (read the gauge with the air"),
+        (["arm.payload", "chamber.dead_volume"], "arm payload (weigh it) or the chamber dead vol"),
+        (["muscle.rest_length"], "muscle rest length (with a ruler or a caliper)"),
+        (["valve.null_voltage"], "valve null voltage by itself: these recordings cannot tell"),
+    ],
+)
+def test_each_value_is_measured_in_the_way_of_its_kind(values: list[str], told: str) -> None:
+    assert told in _measured([Term.parse(f"{name}") for name in values], SHOULDER)
+
+
+def test_no_value_is_measured_by_what_measures_another_kind() -> None:
+    """Nobody weighs a zero."""
+    for name, known in SHOULDER.parameters.items():
+        said = _measured([Term.parse(name)], SHOULDER)
+        assert ("weigh" in said) == (known.unit == "kg"), name
+        assert ("ruler" in said) == (known.unit == "m"), name

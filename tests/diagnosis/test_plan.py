@@ -69,6 +69,13 @@ def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str],
     assert "Not tested with this rig" in page
 
 
+def test_a_plan_tells_how_far_it_is() -> None:
+    heard = list[str]()
+    pamrs.plan_diagnosis(pamrs.rigs.sealed_chamber(), ["muscle_pressure"], progress=heard.append)
+    assert heard[:2] == ["hold_low", "hold_high"]
+    assert [line.share for line in heard] == [0.0, 0.25, 0.5, 0.75]  # type: ignore[attr-defined]
+
+
 def test_unknown_names_are_errors_that_name_them() -> None:
     rig = pamrs.rigs.sealed_chamber()
     for channel, more, words in (

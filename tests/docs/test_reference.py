@@ -1,4 +1,4 @@
-"""Pages of the reference that the site makes from the package, without the site."""
+"""Pages of the reference that are made from the package."""
 
 from __future__ import annotations
 
@@ -30,6 +30,14 @@ def loaded() -> ModuleType:
 
 
 MADE = {name: "\n".join(make()) for name, make in loaded().MADE.items()}
+
+
+def test_the_tables_in_the_sources_are_the_made_ones() -> None:
+    """`make reference` writes them."""
+    pages = dict(loaded().made_pages())
+    assert [page for page, text in pages.items() if page.read_text(encoding="utf-8") != text] == []
+    marked = "".join(pages.values())
+    assert all(f"<!-- {name} -->" in marked for name in MADE)
 
 
 @pytest.mark.parametrize("name", MADE)

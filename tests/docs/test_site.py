@@ -18,6 +18,8 @@ DOCS = ROOT / "docs"
 #: Folders whose pages are made by a command, or are records of what was found.
 RECORDS = ("effects", "reproduction", "proof", "decisions")
 MOST_WORDS = 1500
+MOST_LETTERS = 500  # of a paragraph
+MADE = ("benchmarks", "convergence", "recruitment")  # pages that a command writes
 PAGES = sorted(page for page in DOCS.rglob("*.md") if not page.name.startswith("_"))
 WRITTEN = [page for page in PAGES if page.relative_to(DOCS).parts[0] not in RECORDS]
 #: Pages whose programs need nothing but the package and take less than a second.
@@ -79,27 +81,49 @@ def test_every_page_is_in_the_contents() -> None:
     assert reached == {name_of(page) for page in PAGES}
 
 
+def words_of(page: Path) -> str:
+    """Text of a page without the tables that are made from the package, and without code."""
+    text = page.read_text(encoding="utf-8")
+    text = re.sub(r"^<!-- (made-\S+) -->$.*?^<!-- end of \1 -->$", "", text, flags=re.M | re.S)
+    return re.sub(r"^ *```.*?^ *```$", "", text, flags=re.M | re.S)
+
+
 @pytest.mark.parametrize("page", WRITTEN, ids=name_of)
 def test_pages_are_short(page: Path) -> None:
-    assert len(page.read_text(encoding="utf-8").split()) <= MOST_WORDS
+    assert len(words_of(page).split()) <= MOST_WORDS
+
+
+def paragraphs(page: Path) -> list[str]:
+    """Paragraphs and points of a page, each as one line; headings, tables and code are none."""
+    parts = re.split(r"\n\s*\n|\n(?=\s*(?:[-*|]|\d+\.) )", words_of(page))
+    lines = [" ".join(part.split()) for part in parts if not part.lstrip("\n").startswith("    ")]
+    return [line for line in lines if not line.startswith(("|", "#"))]
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=name_of)
+def test_paragraphs_are_short(page: Path) -> None:
+    if name_of(page) not in MADE:
+        assert [line for line in paragraphs(page) if len(line) > MOST_LETTERS] == []
 
 
 def is_public(module: ModuleType, word: str) -> bool:
-    """Whether a module offers a name: in its list, as a package in it, or made when asked for."""
+    """Whether a module offers a name: in its list, or made when asked for."""
     public = getattr(module, "__all__", None)
-    package = isinstance(getattr(module, word), ModuleType) and hasattr(module, "__path__")
-    return public is None or word in public or package or word not in vars(module)
+    return public is None or word in public or word not in vars(module)
 
 
-def known(path: list[str]) -> Any:
-    """What a dotted name of the package is; nothing that begins with an underscore."""
+def known(path: list[str], *, imported: bool = False) -> Any:
+    """What a dotted name of the package is, nothing that begins with an underscore: as an import
+    finds it, which loads what it names, or else as it is there after ``import pamrs`` alone.
+    """
     thing: Any = importlib.import_module(path[0])
     for word in path[1:]:
         assert not word.startswith("_"), ".".join(path)
         if isinstance(thing, ModuleType):
-            if not hasattr(thing, word):
+            if imported and not hasattr(thing, word):
                 importlib.import_module(f"{thing.__name__}.{word}")
-            assert is_public(thing, word), f"{'.'.join(path)}: {word} is not public"
+            loaded = imported and isinstance(getattr(thing, word), ModuleType)
+            assert loaded or is_public(thing, word), f"{'.'.join(path)}: {word} is not public"
         thing = getattr(thing, word)
     return thing
 
@@ -119,12 +143,12 @@ def public_names(text: str, names: dict[str, list[str]]) -> int:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 if alias.name.split(".")[0] == "pamrs":
-                    known(alias.name.split("."))
+                    known(alias.name.split("."), imported=True)
                     names[alias.asname or "pamrs"] = [alias.name if alias.asname else "pamrs"]
         elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "pamrs":
             for alias in node.names:
                 path = [*str(node.module).split("."), alias.name]
-                known(path)
+                known(path, imported=True)
                 count += 1
                 names[alias.asname or alias.name] = path
     for node in ast.walk(tree):
@@ -144,6 +168,19 @@ def test_programs_name_what_is_public(page: Path) -> None:
     assert found or not any("pamrs." in text for text in programs(page))
 
 
+def spoken(page: Path) -> list[str]:
+    """Names of the package in a page's text and in its lists of the reference."""
+    text = re.sub(r"^```python\n.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    found = re.findall(r"`(pamrs(?:\.[A-Za-z]\w*)+)[`(]", text)
+    return found + re.findall(r"^   (pamrs(?:\.\w+)+)$", text, re.M)
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *WRITTEN], ids=lambda page: page.stem)
+def test_names_in_texts_are_there_after_import_pamrs(page: Path) -> None:
+    for name in spoken(page):
+        known(name.split("."))
+
+
 @pytest.mark.parametrize("name", QUICK)
 def test_quick_programs_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -156,8 +193,13 @@ def test_quick_programs_run(name: str, tmp_path: Path, monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize(
     "text",
-    ["pamrs.Muscles()", "from pamrs.fit import fit_mussel", "import pamrs.rig._muscle"],
+    [
+        "pamrs.Muscles()",
+        "from pamrs.fit import fit_mussel",
+        "import pamrs.rig._muscle",
+        "pamrs.fit.levels.found",
+    ],
 )
 def test_a_name_that_is_not_public_is_found(text: str) -> None:
-    with pytest.raises((AssertionError, ImportError)):
+    with pytest.raises((AssertionError, AttributeError, ImportError)):
         public_names(text, {"pamrs": ["pamrs"]})

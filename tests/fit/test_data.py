@@ -162,6 +162,19 @@ def test_wrong_units_are_an_error_that_names_the_likely_unit(columns, unit):
 
 
 @pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        ({"pressure": PRESSURES * 1e5}, r"pressures around [\d.e+]+ psi, beyond 725\.189 psi"),
+        ({"pressure": PRESSURES / 1e6}, r"pressure up to [\d.e-]+ psi only"),
+        ({"length": LENGTHS * 1e3}, r"lengths up to [\d.e+]+ in do not .* [\d.]+ in: wrong"),
+    ],
+)
+def test_wrong_units_are_told_in_those_of_the_file(columns, told):
+    with pytest.raises(RecordingError, match=told):
+        made(**columns, units={"pressure": "psi", "length": "in", "force": "lbf"})
+
+
+@pytest.mark.parametrize(
     ("options", "match"),
     [
         ({"rest_length": 300.0}, "rest_length = 300 m is not allowed.*in mm"),
@@ -513,7 +526,8 @@ def lifting(activation, ambient=0.0, stiffness=2e3, noise=0.0, lengths=(0.30, 0.
 def test_absolute_pressures_are_asked_about(noise):
     (issue,) = made(*lifting(0.0, 101.3e3, noise=noise)).issues
     words = (
-        r"forces vanish near (9\d|10\d)(\.\d)? kPa .*are the pressures absolute\? gauge pressures"
+        r"forces vanish near (9\.\d+e\+04|1\.0\d*e\+05) Pa .*are the pressures absolute\? gauge "
+        "pressures"
     )
     assert re.match(f"{words} are needed", issue)
 

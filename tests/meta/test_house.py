@@ -87,6 +87,7 @@ HEAVY = ("scipy", "pandas", "matplotlib", "jinja2", "xarray", "zarr", "dask")
 @pytest.mark.parametrize(
     ("used", "absent"),
     [
+        ("dir(pamrs)", (*HEAVY, "numpy", "pamrs._core", "pamrs.rig", "pamrs.control")),
         ("pamrs.rigs.shoulder(); pamrs.load_recording; pamrs.load_case", (*HEAVY, "typer")),
         ("import pamrs.cli; pamrs.cli.main(['--help'])", (*HEAVY, "numpy")),
         ("pamrs.simulate(pamrs.rigs.tube(), sample_time=0.1, duration=0.2)", ("matplotlib",)),
@@ -101,6 +102,7 @@ def test_import_is_light(used, absent):
 
 def test_public_names_exist():
     assert set(pamrs.__all__) <= set(dir(pamrs))
+    assert dir(pamrs.rigs) == sorted(pamrs.rigs.names())
     for name in pamrs.__all__:
         assert getattr(pamrs, name) is not None
     with pytest.raises(AttributeError, match="nonsense"):

@@ -23,6 +23,7 @@ ARRAYS = {
     "muscle_pressure": RUN["muscle_pressure"],
     "joint_angle": RUN["joint_angle"],
 }
+MIXED = [*ARRAYS["joint_angle"][:-1], "open"]
 
 
 def test_arrays_are_what_a_file_of_the_same_would_be(tmp_path: Path) -> None:
@@ -175,9 +176,15 @@ def test_masked_values_are_missing_and_turns_are_moved_as_in_a_folder() -> None:
         ({"run": {}}, {}, CaseError, "recording 'run' has no channel but time"),
         ({"run": {"time": TIME}}, {}, CaseError, "recording 'run' has no channel but time"),
         ({"run": ARRAYS | {"joint_angle": TIME[:9]}}, {}, CaseError, "joint_angle 9"),
-        ({"run": ARRAYS | {"joint_angle": ["a"] * 400}}, {}, CaseError, "'joint_angle' has the ty"),
+        ({"run": ARRAYS | {"joint_angle": ["1"] * 400}}, {}, CaseError, "'joint_angle' has the ty"),
+        ({"run": ARRAYS | {"joint_angle": MIXED}}, {}, CaseError, "no numbers, such as 'open'"),
         ({"run": ARRAYS | {"joint_angle": 1j * TIME}}, {}, CaseError, "the type complex128"),
-        ({"run": ARRAYS | {"joint_angle": TIME[:, None]}}, {}, CaseError, r"shape \(400, 1\)"),
+        (
+            {"run": ARRAYS | {"joint_angle": TIME[:, None]}},
+            {},
+            CaseError,
+            r"\(400, 1\); \(400,\) is",
+        ),
         ({"run": ARRAYS}, {"held_out": ["other"]}, CaseError, r"held_out = \['other'\]"),
         ({"run": ARRAYS}, {"held_out": "run"}, CaseError, "a list of names is needed"),
         ({"run": ARRAYS}, {"held_out": ["run"]}, CaseError, "one recording is needed that is fit"),
@@ -191,6 +198,29 @@ def test_masked_values_are_missing_and_turns_are_moved_as_in_a_folder() -> None:
 def test_what_cannot_be_a_case_is_named(tables, options, error, said) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(error, match=said):
         pamrs.Case.from_arrays(RIG, tables, **{"sample_time": 0.005} | options)
+
+
+def test_a_table_that_lacks_a_channel_names_that_one_alone() -> None:
+    frame = pd.DataFrame(ARRAYS)
+    short = frame.drop(columns="joint_angle")
+    other = pamrs.simulate(RIG, 10.5 - COMMAND[::-1], sample_time=0.005)
+    two = {name: other[name] for name in ("valve_command", "muscle_pressure")}
+    for tables, told in (
+        ({"run": short}, r"measure supply_pressure, joint_angle$"),
+        ({"run": short.assign(supply_pressure=RUN["supply_pressure"])}, r"measure joint_angle$"),
+        (
+            {"one": frame.assign(supply_pressure=RUN["supply_pressure"]), "two": two},
+            r"measure supply_pressure \(not in two\), joint_angle \(not in two\)$",
+        ),
+    ):
+        with pytest.raises(DiagnosisError, match=told):
+            pamrs.diagnose(pamrs.Case.from_arrays(RIG, tables, sample_time=0.005))
+
+
+def test_dates_begin_with_the_first_that_is_one() -> None:
+    dates = pd.date_range("2026-01-01", periods=TIME.size, freq="5ms").to_series()
+    frame = pd.DataFrame(ARRAYS | {"time": dates.shift(1).to_numpy()})
+    assert alone(frame).sample_time == pytest.approx(0.005)
 
 
 def test_a_column_that_is_there_twice_is_named() -> None:

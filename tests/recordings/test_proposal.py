@@ -166,7 +166,13 @@ SUSPECT: list[tuple[str, str, Any, str, str]] = [
     ("supply_pressure", "bar", SUPPLY * 14.5 * BAR, "psi", "13.8 bar of the supply of the rig"),
     ("supply_pressure", "psi", SUPPLY * PSI, "bar", "read as bar it reaches 13.6 bar"),
     ("supply_pressure", "Pa", SUPPLY * 100.0, "kPa", ""),
-    ("muscle_pressure", "bar", VENTED * 14.5 * BAR, "psi", "read as psi it reaches 3.599 bar"),
+    (
+        "muscle_pressure",
+        "bar",
+        VENTED * 14.5 * BAR,
+        "psi",
+        "read as psi it reaches 52.2 psi (3.599 bar)",
+    ),
     ("muscle_pressure", "bar", (VENTED + 1.013) * BAR, "absolute", "the ambient pressure"),
     ("muscle_pressure", "bar", (VENTED - 1.013) * BAR, "gauge", "a vacuum"),
     ("temperature", "K", 21.0 + LIFT, "degC", "said to be in K"),
@@ -184,6 +190,36 @@ def test_units_that_physics_contradicts(
     units = {"supply_pressure": "bar", channel: said}
     (found,) = suspicions(channels, units, SHOULDER)
     assert (found.channel, found.likely) == (channel, likely)
+    assert words in found.text
+
+
+IN_PSI = pamrs.rig.parse_rig(
+    SHOULDER.to_toml_text(comments=False).replace(
+        'initial_pressure = { value = 1380000.0, unit = "Pa"',
+        'initial_pressure = { value = 200.0, unit = "psi"',
+    )
+)
+
+
+@pytest.mark.parametrize(
+    ("channel", "said", "values", "words"),
+    [
+        (
+            "muscle_pressure",
+            "bar",
+            VENTED * 14.5 * BAR,
+            "would reach 52.2 bar (757 psi), against 13.79 bar (200 psi) of the supply of the rig "
+            "file; read as psi it reaches 52.2 psi",
+        ),
+        ("supply_pressure", "kPa", SUPPLY * 100.0, "would reach 1.36 kPa (0.1972 psi), against"),
+        ("muscle_pressure", "mbar", VENTED * BAR + 101325.0, "never falls below 1013 mbar and"),
+        ("temperature", "K", 21.0 + LIFT, "would be 21.5 K; read as degC it is 21.5 degC"),
+    ],
+)
+def test_the_evidence_is_in_the_units_of_the_log_and_of_the_rig_file(
+    channel: str, said: str, values: Any, words: str
+) -> None:
+    (found,) = suspicions({channel: values}, {channel: said}, IN_PSI)
     assert words in found.text
 
 

@@ -402,7 +402,7 @@ def test_rig_check_says_what_is_connected_and_what_everything_is(
     lines = out.splitlines()
     assert lines[: len(rig.wiring)] == rig.wiring
     shown = dict(line.split(maxsplit=1) for line in lines[len(rig.wiring) : -1])
-    assert shown["valve.flexor.discharge_area_max"].startswith("1.2e-06 ± ")
+    assert shown["valve.flexor.discharge_area_max"] == "1.2 ± 0.1 mm2"
     assert shown["chamber.flexor.alpha_in"] == "1.4"  # a plain number has no unit
     bounds = next(p for p in EFFECTS["leak_muscle"].parameters if p.name == "conductance")
     assert shown["leak_muscle.flexor.conductance"] == (
@@ -487,7 +487,7 @@ def test_muscles_of_which_nobody_says_what_they_bear_are_told() -> None:
         (
             r"^rest_length *=.*?$",
             'rest_length = { value = 2.76, unit = "m", tol = 0.01 }',
-            ["muscle is long for its joint", "45.2 mm, 1.6 %", "= 2760 mm"],
+            ["muscle is long for its joint", "0.0452 m, 1.6 %", "= 2.76 m"],
         ),
         (
             r"^rest_length *=.*?$",

@@ -107,7 +107,7 @@ def test_wrong_values_and_wrong_ports_are_found_at_once() -> None:
             "supply.volume",
             "muscle.x.chamber is missing",
             "'elbw'",
-            "joint.elbow.max_angle = 0 rad",
+            "joint.elbow.max_angle = 0 deg",
         )
     )
 
@@ -144,8 +144,8 @@ def test_a_link_without_inertia_and_a_chamber_below_vacuum() -> None:
     thin = HEAD + 'ambient_pressure = { value = 0.5, unit = "bar" }\n[chamber]\n' + LEAST["chamber"]
     message = refused(thin + '\ninitial_pressure = { value = -0.6, unit = "bar" }\n')
     assert (
-        "chamber.initial_pressure = -60000 Pa (gauge) is not allowed: more than "
-        "-gas.ambient_pressure = -50000 Pa"
+        "chamber.initial_pressure = -0.6 bar (gauge) is not allowed: more than "
+        "-gas.ambient_pressure = -0.5 bar"
     ) in message
 
 
@@ -155,10 +155,7 @@ def test_only_an_inlet_that_valves_feed_has_a_volume() -> None:
     assert fed.ports("line")[""] == {"from": "", "to": "chamber"}
     assert fed.parameters["line.inlet_volume"].value == pytest.approx(5e-6)
     message = refused(stand("supply", "line", "chamber", line=inlet))
-    assert (
-        "line.inlet_volume = 5e-06 m3 is not allowed: line begins at supply, and only an inlet"
-        in message
-    )
+    assert "line.inlet_volume is not allowed: line begins at supply, and only an inlet" in message
 
 
 def test_blocks_that_do_not_fit_are_found_in_a_rig_made_by_hand() -> None:

@@ -1,4 +1,4 @@
-"""Pressures in bar where pascals are wanted are told to whoever gave them."""
+"""What is most likely meant in another unit, or from another line, is told to whoever gave it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import pytest
 
 import pamrs
 from pamrs.design.sizing import free_contraction
-from pamrs.errors import ParameterError, UnitWarning
+from pamrs.errors import PamrsError, ParameterError, UnitWarning
+from pamrs.rig import parse_rig
 
 TOLD = r"never exceeds 2 Pa \(gauge\): pascals are wanted, 1 bar is 1e5"
 
@@ -46,6 +47,57 @@ def test_two_pascals_are_doubted(call, what: str) -> None:  # type: ignore[no-un
     with pytest.warns(UnitWarning, match=rf"^{what} {TOLD}") as caught:
         call()
     assert caught[0].filename == __file__
+
+
+RESTING = {"valve_command": np.full(9, 5.0), "muscle_pressure": np.zeros(9)}
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: pamrs.simulate(SHOULDER, RESTING["valve_command"], sample_time=5),
+        lambda: pamrs.simulate_batch(SHOULDER, RESTING["valve_command"], sample_time=5, n=2),
+        lambda: pamrs.Simulator(SHOULDER, sample_time=5),
+        lambda: pamrs.Batch(SHOULDER, n=2, sample_time=5),
+        lambda: pamrs.Case.from_arrays(SHOULDER, {"run": RESTING}, sample_time=5),
+    ],
+)
+def test_five_seconds_ask_for_milliseconds(call) -> None:  # type: ignore[no-untyped-def]
+    with pytest.warns(
+        UnitWarning, match=r"^sample_time = 5 s: are milli.* 5 ms is 0\.005"
+    ) as caught:
+        call()
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize(
+    ("call", "shown"),
+    [
+        (lambda angle: SHOULDER.muscle.replace(braid_angle=np.radians(angle)), "0.287979 rad"),
+        (lambda angle: SHOULDER.muscle.replace(braid_angle=angle), "16.5 rad"),
+        (
+            lambda angle: SHOULDER.with_parameters({"muscle.braid_angle": np.radians(angle)}),
+            "0.287979 rad",
+        ),
+        (
+            lambda angle: parse_rig(
+                pamrs.rigs.template().replace("value = 73.5, ", f"value = {angle}, ")
+            ),
+            "16.5 deg",
+        ),
+    ],
+)
+def test_a_braid_angle_from_the_axis_is_asked_from_the_circumference(call, shown) -> None:  # type: ignore[no-untyped-def]
+    asked = rf"braid_angle = {shown} .*, measured from the circumference; 73\.5 deg\?$"
+    with pytest.raises(PamrsError, match=asked):
+        call(16.5)
+    call(73.5 if "deg" in shown or shown.startswith("0") else np.radians(73.5))
+
+
+def test_degrees_where_radians_are_wanted_are_asked_for() -> None:
+    for name, degrees in (("muscle.braid_angle", 73.5), ("joint.rest_angle", 15.0)):
+        with pytest.raises(ParameterError, match=rf"{degrees:g} rad is not .*; {degrees:g} deg\?$"):
+            SHOULDER.with_parameters({name: degrees})
 
 
 def test_a_length_where_a_contraction_is_wanted_is_doubted() -> None:
@@ -112,3 +164,4 @@ def test_what_a_sensor_reads_and_what_the_package_asks_is_not_doubted() -> None:
         rig.muscle.force(0.0, 0.05)
         rig.muscle.force([1.0, 2e5], 0.05)
         pamrs.Joint(kind="pulley", radius=0.03).torque(rig.muscle, [0.0, 2e5], 0.5)
+        pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=60.0, duration=600.0)  # a leak

@@ -50,6 +50,8 @@ GEOMETRY: Final = {
 QUIET: Final = ContextVar("QUIET", default=False)
 #: What ``--json -`` names; no other option means it.
 STDOUT: Final = Path("-")
+#: Seconds from one line of progress to the next where standard error is no terminal.
+_EVERY: Final = 10.0
 
 
 _QUIETLY = Annotated[
@@ -273,11 +275,13 @@ def write(contents: Contents, told: str = "") -> None:
 
 
 @contextmanager
-def progress(text: str) -> Iterator[Callable[[str], None]]:
-    """Say on standard error what is going on, with a clock where a person is looking; what it gives
-    takes lines, which are shown there with percent and time left.
+def progress(text: str, *, ends: bool = True) -> Iterator[Callable[[str], None]]:
+    """Say on standard error what is going on, with percent and time left; what it gives takes lines
+    of the work.
 
-    With ``NO_COLOR`` or ``TERM=dumb`` in the environment a terminal gets plain lines.
+    Where a person is looking that is a line that is written anew; elsewhere, and on a terminal with
+    ``NO_COLOR`` or ``TERM=dumb`` in the environment, a plain line every ten seconds; lines say that
+    it begins and that it is done unless ``ends`` is False.
     """
     started, text = time.perf_counter(), shown(text)
     plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
@@ -287,7 +291,24 @@ def progress(text: str) -> Iterator[Callable[[str], None]]:
 
         with Console(file=terminal()).status(Text(text)) as status:
             yield lambda line: status.update(Text(shown(getattr(line, "whole", line))))
-    else:
-        note(f"{text} ...")
+    elif QUIET.get():
         yield lambda line: None
-    note(f"{text}: done in {time.perf_counter() - started:.1f} s")
+    else:
+        from pamrs._progress import at_even_times
+
+        if ends:
+            note(f"{text} ...")
+        with at_even_times(text, lambda line: note(shown(line)), _EVERY) as say:
+            yield say
+    if ends:
+        note(f"{text}: done in {time.perf_counter() - started:.1f} s")
+
+
+@contextmanager
+def counted(what: str) -> Iterator[Callable[[int, int], None]]:
+    """:func:`progress` of a work that is counted; what it gives takes how many are done, of all."""
+    from pamrs._progress import Steps
+
+    with progress(what, ends=False) as say:
+        steps = Steps(say)
+        yield lambda done, of: steps(f"{what}: {done} of {of}", done / of)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -12,8 +10,16 @@ import typer
 
 from pamrs._checks import refused
 from pamrs._writing import check_writable
-from pamrs.cli._shared import Contents, document, exact, file_of, json_help, named_muscle, write
-from pamrs.cli._streams import terminal
+from pamrs.cli._shared import (
+    Contents,
+    counted,
+    document,
+    exact,
+    file_of,
+    json_help,
+    named_muscle,
+    write,
+)
 from pamrs.cli.completion import muscle_names
 from pamrs.units import bar_and_psi
 
@@ -82,11 +88,11 @@ def _joint(
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
     told, found = title, None
     given: dict[str, Any] = {} if evaluations is None else {"evaluations": evaluations}
-    with _bar("designs") as bar:
+    with counted("designs") as say:
         if minimise_pressure:
-            found = least_pressure(problem, seed=seed, progress=bar, **given)
+            found = least_pressure(problem, seed=seed, progress=say, **given)
             told = f"{title}: {_least(problem, found)}"
-        found = found or optimise(problem, seed=seed, progress=bar, **given)
+        found = found or optimise(problem, seed=seed, progress=say, **given)
     contents: Contents = {
         json: _document(title, seed, found) if json else "",
         rig_joint: found.to_toml() if rig_joint else "",
@@ -147,26 +153,6 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
 
 
 # ------------------------------------------------------------------------ outputs
-
-
-@contextmanager
-def _bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
-    """A progress bar on standard error where a person is looking."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(file=terminal()), transient=True) as progress:
-        task = progress.add_task(what, total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
 def _least(problem: JointProblem, found: JointDesign | None) -> str:

@@ -228,6 +228,6 @@ def _plan(
         if channels is None
         else [name.strip() for name in channels.split(",") if name.strip()]
     )
-    with progress(f"planning for {loaded.name}"):
-        result = plan_diagnosis(loaded, given, noise=noise)
+    with progress(f"planning for {loaded.name}") as say:
+        result = plan_diagnosis(loaded, given, noise=noise, progress=say)
     write({json: dumps(result.to_dict(), indent=2) + "\n"}, result.text())

@@ -12,7 +12,7 @@ from pamrs._files import resolved
 from pamrs._writing import write_atomically
 from pamrs.cli._shared import RigName, check_new, rig_named
 from pamrs.cli.completion import rig_names
-from pamrs.units import with_unit
+from pamrs.units import from_si, with_unit
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
@@ -23,7 +23,8 @@ rig_app = typer.Typer(help="Work with rig files.")
 @rig_app.command("check")
 def _rig_check(file: RigName) -> None:
     """Check a rig file, say what is connected to what, and list its parameters, and those of its
-    effects with their bounds, in SI units; what is possible and hardly meant is a warning.
+    effects with their bounds, in the units of the file; what is possible and hardly meant is a
+    warning.
     """
     from pamrs.simulation import core_rig
 
@@ -34,10 +35,10 @@ def _rig_check(file: RigName) -> None:
     for line in rig.wiring:
         typer.echo(line)
     shown = {}
-    for name, parameter in rig.parameters.items():
-        known = f"{parameter.value:.6g}" if parameter.known else "unknown"
-        spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
-        shown[name] = with_unit(f"{known}{spread}", parameter.unit)
+    for name, own in rig.parameters.items():
+        unknown = with_unit("unknown", rig.units.of(name, own.unit))
+        told = rig.units.said(name, own.unit, own.value, own.tol, ".6g") if own.known else unknown
+        shown[name] = told
     shown |= _of_effects(rig)
     shown |= {name: f"{shown[name]}, another one in each recording" for name in rig.own}
     width = max(map(len, shown), default=0)
@@ -68,10 +69,11 @@ def _of_effects(rig: Rig) -> dict[str, str]:
         full = qualified(own, entry.get("at", ""))
         spread = rig.effect_std.get(own if several.count(own) == 1 else full, {})
         for p in EFFECTS[own].form(entry.get("form", "")).parameters:
-            value = f"{entry['parameters'][p.name]:.6g}"
-            std = f" ± {spread[p.name]:.3g}" if spread.get(p.name) else ""
-            bounds = with_unit(f"{p.lower:g} to {p.upper:g}", p.unit)
-            shown[f"{full}.{p.name}"] = f"{with_unit(value + std, p.unit)}; allowed from {bounds}"
+            name, std = f"{full}.{p.name}", spread.get(p.name, 0.0)
+            unit = rig.units.of(name, p.unit)
+            low, high = (from_si(end, unit, p.unit) for end in (p.lower, p.upper))
+            known = rig.units.said(name, p.unit, entry["parameters"][p.name], std, ".6g")
+            shown[name] = f"{known}; allowed from {with_unit(f'{low:g} to {high:g}', unit)}"
     return shown
 
 

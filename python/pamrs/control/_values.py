@@ -9,11 +9,21 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pamrs._checks import checked_number, one_of, refused, rising
+from pamrs._checks import (
+    as_column,
+    as_numbers,
+    checked_number,
+    matched,
+    misshapen,
+    one_of,
+    rising,
+)
 from pamrs.control._protocol import Value
 from pamrs.errors import ParameterError
 
+Times = NDArray[np.float64]
 #: How many of a unit are in a radian.
 _PER_RADIAN: Final[dict[str, float]] = {"rad": 1.0, "deg": 180.0 / math.pi}
 
@@ -44,14 +54,9 @@ def as_value(
     ParameterError
         If it is not of that form; the message names it.
     """
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise refused(name, value, "a number or an array of shape (n,) is needed") from None
+    array = as_numbers(name, value)
     if array.ndim > 1 or array.size == 0:
-        raise ParameterError(
-            f"{name} has shape {array.shape}: a number or an array of shape (n,) is needed"
-        )
+        raise misshapen(name, array.shape, each="or a number")
     wrong = ~(np.isfinite(array) & (array >= lower) & (array <= upper))
     if above:
         wrong |= array == lower
@@ -78,6 +83,20 @@ def gains_of(names: Sequence[str], gains: Sequence[Any]) -> tuple[Value, ...]:
         )
     pairs = zip(names, gains, strict=True)
     return tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
+
+
+def times_of(values: Any, least: int) -> Times:
+    """Rising times [s], ``least`` of them or more; a ParameterError for anything else."""
+    (times,) = matched(time=as_column("time", values))
+    if times.size < least:
+        raise ParameterError(f"time has {times.size} samples; {least} at least are needed")
+    if not (np.diff(times) > 0.0).all():
+        k = int(np.argmin(np.diff(times)))
+        raise ParameterError(
+            f"time[{k + 1}] = {times[k + 1]:g} s is not allowed: times have to rise, and time[{k}] "
+            f"is {times[k]:g} s"
+        )
+    return times
 
 
 def positive_gain(name: str, value: Any) -> Value:

@@ -19,8 +19,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import refused
-from pamrs.control._values import angle_factor
+from pamrs._checks import as_numbers, refused
+from pamrs.control._values import angle_factor, times_of
 from pamrs.errors import ParameterError
 
 __all__ = [
@@ -386,12 +386,7 @@ def _checked(time: ArrayLike, name: str, values: ArrayLike) -> tuple[Array, Arra
     Values that are not finite are an error too. In a batch they are those of a run that failed: its
     whole row is NaN, and so is all that is found for it.
     """
-    t, y = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    if t.ndim != 1 or t.size < 2 or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
-        raise ParameterError(
-            f"time with the shape {t.shape} is not allowed: two or more finite, rising times [s] "
-            "are needed"
-        )
+    t, y = times_of(time, 2), as_numbers(name, values)
     if y.ndim not in (1, 2) or y.shape[-1] != t.size:
         raise ParameterError(
             f"{name} has the shape {y.shape}; ({t.size},) or (n, {t.size}) is needed"

@@ -21,8 +21,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import finite, positive, quantities, whole
+from pamrs._checks import as_numbers, finite, matched, misshapen, positive, quantities, whole
 from pamrs.control._protocol import Reference
+from pamrs.control._values import times_of
 from pamrs.errors import ParameterError
 
 __all__ = [
@@ -557,20 +558,10 @@ def from_samples(
     ParameterError
         If the table is too short, not finite, not rising, or the weight is negative.
     """
-    t, y = (np.asarray(values, dtype=np.float64) for values in (time, angle))
-    if t.ndim != 1 or t.shape != y.shape or t.size < 5:
-        raise ParameterError(
-            f"time and angle have the shapes {t.shape} and {y.shape}; (n,) with n >= 5 is needed "
-            "for both"
-        )
-    if not (np.isfinite(t).all() and np.isfinite(y).all()):
-        raise ParameterError("time or angle is not finite: every entry has to be a finite number")
-    if not (np.diff(t) > 0.0).all():
-        k = int(np.argmin(np.diff(t)))
-        raise ParameterError(
-            f"time[{k + 1}] = {t[k + 1]:g} s is not allowed: times have to rise, and time[{k}] is "
-            f"{t[k]:g} s"
-        )
+    t, y = times_of(time, 5), as_numbers("angle", angle)
+    if t.shape != y.shape:
+        raise misshapen("angle", y.shape, t.size, "that of time")
+    matched(angle=y)
     weight = None if smoothing is None else positive("smoothing", smoothing, zero=True)
     from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 

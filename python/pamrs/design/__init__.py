@@ -15,6 +15,7 @@ True
 
 from __future__ import annotations
 
+from pamrs.design import sizing
 from pamrs.design._filling import Filling
 from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, least_pressure, optimise
 from pamrs.design._problem import DEFAULT_BOUNDS, LENGTHS, SYMBOLS, JointProblem, Scores
@@ -30,4 +31,5 @@ __all__ = [
     "Scores",
     "least_pressure",
     "optimise",
+    "sizing",
 ]

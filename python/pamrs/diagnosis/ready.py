@@ -110,7 +110,7 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
     if not blocks:
         told = (
             f"case {case.name!r}: its channels ({', '.join(case.channels)}) do not surround any "
-            f"block of the rig ({', '.join(case.rig.blocks)}); measure {_wanted(case.rig)}"
+            f"block of the rig ({', '.join(case.rig.blocks)}); measure {_lacking(case)}"
         )
         raise DiagnosisError("\n".join([told, *left, *odd, *empty]))
     return Ready(case, blocks, suspected, [*copies, *held], masked, [*dead, *clipped])
@@ -188,12 +188,13 @@ def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
     for name, ports in rig.ports("supply").items():
         inlet = block_of(ports.get("inlet", ""))
         table = rig.tables("supply").get(inlet) if ports.get("inlet") else None
-        gauge = dotted("supply_pressure", inlet)
+        gauge, begun = dotted("supply_pressure", inlet), qualified("supply", inlet)
+        begun = f"{begun}.initial_pressure"
         if table is not None and table["kind"] == "tank" and gauge not in channels:
             said.append(
                 f"{gauge} was not recorded: {qualified('supply', name)} is taken to have "
-                f"{table['initial_pressure'] / 1e5:.3g} bar in front of it throughout; record it "
-                "where the tank may come near to what the regulator is set to"
+                f"{rig.units.said(begun, 'Pa', table['initial_pressure'])} in front of it "
+                "throughout; record it where the tank may come near to what the regulator is set to"
             )
     return said
 
@@ -221,11 +222,19 @@ def _said_of_held(rig: Rig) -> list[str]:
     return said
 
 
-def _wanted(rig: Rig) -> str:
-    """Channels that surround a rig's blocks, by name."""
+def _lacking(case: Case) -> str:
+    """Channels that a case's rig has and not all of its recordings, by name, each with those that
+    lack it where others have it.
+    """
+    rig = case.rig
     names = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
     names += [dotted("supply_pressure", name) for name in rig.tables("supply")]
     names += [dotted("joint_angle", name) for name in rig.tables("joint")]
     names += ["length"] if rig.model["load"] else []
     names += ["force"] if (rig.model["load"] or {}).get("kind") == "frame" else []
-    return ", ".join([*names, *core_rig(rig).inputs])
+    told = []
+    for name in (name for name in (*names, *core_rig(rig).inputs) if name not in case.channels):
+        without = [r.name for r in case.recordings if name not in r.channels]
+        some = len(without) < len(case.recordings)
+        told.append(f"{name} (not in {', '.join(without)})" if some else name)
+    return ", ".join(told)

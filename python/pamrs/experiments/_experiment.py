@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from string import Formatter
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +16,11 @@ from pamrs.experiments._chains import driving
 from pamrs.findings import Protocol
 from pamrs.rig import Rig, payload_of
 from pamrs.simulation import Simulation, has_frame, simulate
+from pamrs.units import to_si
 
 Array = NDArray[np.float64]
+#: Units that texts are written in, their SI unit, and digits behind the point.
+_SAID: Final = {"bar": ("Pa", 2), "mm": ("m", 1), "kg": ("kg", 2), "deg": ("rad", 0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +104,38 @@ class Experiment:
         )
 
 
+class Told(Formatter):
+    """What is said of experiments, in the units of a rig's file.
+
+    Numbers that a text marks ``{level:bar}``, ``{length:mm.3g}``, are in that unit, and told in the
+    one of the rig, which ``{bar}`` stands for: as fine as hundredths of a bar and tenths of a
+    millimetre, or as their format says.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self._units = {name: rig.units.usual(si) for name, (si, _) in _SAID.items()}
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """A number, in the unit of the rig where it is marked."""
+        name, _, own = format_spec.partition(".")
+        if name not in self._units:
+            return str(super().format_field(value, format_spec))
+        si, digits = _SAID[name]
+        scale = to_si(1.0, name, si) / to_si(1.0, self._units[name], si)
+        fine = digits - round(math.log10(scale))
+        return f"{value * scale:.{own}}" if own else f"{round(value * scale, fine):g}"
+
+    def get_value(self, key: int | str, args: Any, kwargs: Any) -> Any:
+        """A fact, or the unit that a name stands for."""
+        return self._units[str(key)] if key in self._units else super().get_value(key, args, kwargs)
+
+    def each(self, values: Sequence[float], name: str, last: str = " and ") -> str:
+        """Numbers in a row, with their unit behind the last one."""
+        words, unit = [self.format_field(value, name) for value in values], name.partition(".")[0]
+        row = [part for part in (", ".join(words[:-1]), *words[-1:]) if part]
+        return f"{last.join(row)} {self._units[unit]}"
+
+
 def protocol_of(experiment: Experiment) -> Protocol | None:
     """The commands of an experiment as a rig can play them; None where nothing is sent."""
     if not experiment.commands:
@@ -144,4 +181,5 @@ def other_payload(rig: Rig) -> tuple[str, float, str] | None:
     if (listed is not None and not others) or (listed is None and now <= 0.0):
         return None
     other = max(others, key=lambda m: abs(m - now)) if others else 0.5 * now
-    return name, other, "" if others else f"another payload, about {other:.3g} kg"
+    told = rig.units.said(name, "kg", other, digits=".3g")
+    return name, other, "" if others else f"another payload, about {told}"

@@ -30,7 +30,14 @@ from pamrs.experiments._chains import (
     pressure_range,
     spans_of,
 )
-from pamrs.experiments._experiment import Experiment, in_bar, in_mm, limited, other_payload
+from pamrs.experiments._experiment import (
+    Experiment,
+    Told,
+    in_bar,
+    in_mm,
+    limited,
+    other_payload,
+)
 from pamrs.experiments._frame import Frame
 from pamrs.rig import Rig
 from pamrs.simulation import simulate
@@ -107,15 +114,17 @@ def _rounded(frequencies: Array) -> list[float]:
     return [round(float(f), 3) for f in frequencies]
 
 
-def _rounded_levels(row: Row, span: Range, told: Callable[[float], float]) -> dict[str, Any]:
+def _rounded_levels(
+    row: Row, span: Range, rounded: Callable[[float], float], told: Told
+) -> dict[str, Any]:
     """Levels of a row and reaches around them, as they are said."""
-    level = [told(span.at(share)) for share in row.get("told", row.get("levels", ()))]
+    level = [rounded(span.at(share)) for share in row.get("told", row.get("levels", ()))]
     step = row.get("step", 0.0) * (span.high - span.low) * 1e-5
     return {
         "level": level,
         "middle": level[0] if level else math.nan,
-        "words": f"{_listed([f'{value:g}' for value in level] or [''])} bar",
-        "reach": [told(share * (span.high - span.low)) for share in row.get("reaches", ())],
+        "words": told.each(level, "bar"),
+        "reach": [rounded(share * (span.high - span.low)) for share in row.get("reaches", ())],
         "step": step,
         "step_told": round(step, 4),
     }
@@ -144,6 +153,11 @@ class Maker:
     dt: float
     frame: Frame | None
     highest: float | Mapping[str, float] | None
+
+    @cached_property
+    def told(self) -> Told:
+        """What texts say, in the units of the rig's file."""
+        return Told(self.rig)
 
     @cached_property
     def spans(self) -> Spans:
@@ -254,7 +268,7 @@ class Maker:
             name, mass, needs = found
             changes, rig = {name: mass}, rig.with_parameters({name: mass})
             facts = {**facts, "payload": mass, "payload_told": round(mass, 3)}
-        text = row["text"].format(**facts) + also[0]
+        text = self.told.format(row["text"], **facts) + also[0]
         numbers = {k: facts[v] if isinstance(v, str) else v for k, v in row["numbers"].items()}
         numbers |= also[1]
         if self.chains[0].regulator is not None:
@@ -265,7 +279,7 @@ class Maker:
                 text += slower
             if length is None:
                 held = self.frame.held
-                text = f"with the length held at {in_mm(held):g} mm, {text}"
+                text = f"with the length held at {self.told.each([in_mm(held)], 'mm')}, {text}"
                 numbers["length_mm"] = in_mm(held)
                 length = np.full(next(iter(references.values())).size, held)
             else:
@@ -303,8 +317,8 @@ class Maker:
             inside = np.clip(values, span.low, span.high)
             found[name] = limited(inside, frame.pressure_rate * self.dt)
             slower |= bool(np.abs(found[name] - inside).max() > 0.01 * (span.high - span.low))
-        told = f", the pressure by no more than {frame.pressure_rate * 1e-5:.2g} bar/s"
-        return found, told if slower else ""
+        most = self.told.each([frame.pressure_rate * 1e-5], "bar.2g")
+        return found, f", the pressure by no more than {most}/s" if slower else ""
 
     def _one(self, row: Row, chain: Chain, **options: Any) -> Experiment | None:
         """One chain goes through a course, and all others are held."""
@@ -314,7 +328,7 @@ class Maker:
             most = max(share for _, share in row["cycle"]) - min(s for _, s in row["cycle"])
             periods[-1] = self._period(periods[-1], most * (span.high - span.low))
         legs = _legs(row, periods)
-        facts = {**self._facts(row, chain), **_rounded_levels(row, span, in_bar)}
+        facts = {**self._facts(row, chain), **_rounded_levels(row, span, in_bar, self.told)}
         facts |= {"periods": periods, "period": periods[-1] if periods else math.nan}
         reference = _course(legs, self._begin(chain), span, self.dt)
         reference = options.pop("reference", reference)
@@ -329,7 +343,7 @@ class Maker:
         references: dict[str, Array] = {
             c.name: np.interp(time, [0.0, 2.0], [self._begin(c), held[c.name]]) for c in others
         }
-        levels = [f"{in_bar(held[c.name]):g} bar" for c in others]
+        levels = [self.told.each([in_bar(held[c.name])], "bar") for c in others]
         same = _listed(levels if len(set(levels)) > 1 else levels[:1])
         return self._driven(
             row,
@@ -354,7 +368,8 @@ class Maker:
             moved = span.at(0.5) + size * _wave(frequencies, time, 2.0 * k)
             references[own.name] = begin + faded * (moved - begin)
             used[own.name] = _rounded(frequencies)
-        facts = self._facts(row, chain) | _rounded_levels(row, self._reach(chain), in_bar)
+        own_levels = _rounded_levels(row, self._reach(chain), in_bar, self.told)
+        facts = self._facts(row, chain) | own_levels
         facts |= self._levels() | {
             "frequencies": used if count > 1 else used[chain.name],
             "lowest": MULTISINE_FREQUENCIES[0],
@@ -366,8 +381,8 @@ class Maker:
         """Between which pressures all chains move, in words and numbers."""
         spans = {c.name: self._reach(c) for c in self.chains}
         levels = {n: [in_bar(s.low), in_bar(s.high)] for n, s in spans.items()}
-        words = _listed([f"{n} between {a:g} and {b:g} bar" for n, (a, b) in levels.items()])
-        return {"words": words, "levels": levels}
+        words = [f"{n} between {self.told.each(ends, 'bar')}" for n, ends in levels.items()]
+        return {"words": _listed(words), "levels": levels}
 
     def _orders(self, row: Row, chain: Chain) -> Experiment | None:
         """Every chain goes through the same shares of its range, each in another order."""
@@ -379,7 +394,7 @@ class Maker:
             legs = _legs({**row, "levels": turned}, ())
             references[own.name] = _course(legs, self._begin(own), reach, self.dt)
             levels[own.name] = [in_bar(reach.at(share)) for share in turned]
-        words = "; ".join(f"{n}: {', '.join(f'{p:g}' for p in v)} bar" for n, v in levels.items())
+        words = "; ".join(f"{n}: {self.told.each(v, 'bar', ', ')}" for n, v in levels.items())
         facts = self._facts(row, chain) | {"levels": levels, "words": words}
         facts["count"] = "three" if len(shares) == 3 else f"{len(shares)}"
         options: dict[str, Any] = {}
@@ -459,16 +474,16 @@ class Maker:
             return None
         spans = frame.spans.alone
         levels: Any = {n: [in_bar(span.at(s)) for s in row["at"]] for n, span in spans.items()}
-        said = {n: _listed([f"{p:g}" for p in own]) for n, own in levels.items()}
+        said = {n: self.told.each(own, "bar") for n, own in levels.items()}
         held = _listed([f"{n} at {words}" for n, words in said.items()])
         if len(set(said.values())) == 1:
             held = next(iter(said.values()))
         valves = sum(len(chain.valves) for chain in self.chains)
         facts = {
             **row,
-            **_rounded_levels(row, stroke, in_mm),
+            **_rounded_levels(row, stroke, in_mm, self.told),
             "lengths": [in_mm(stroke.high), in_mm(stroke.low)],
-            "held": f"{held} bar",
+            "held": held,
             "held_bar": levels if len(levels) > 1 else next(iter(levels.values())),
             "all_valves": "all valves" if valves > 1 else "the valve",
         }
@@ -503,7 +518,7 @@ class Maker:
         facts |= {
             "period": periods[-1],
             "periods": [round(period, 2) for period in periods],
-            "speeds": _listed([f"{1e3 * speed:.3g}" for speed in speeds]),
+            "speeds": f"{self.told.each([1e3 * speed for speed in speeds], 'mm.3g')}/s",
         }
         options: dict[str, Any] = {}
         if "shut_from" in row:
@@ -526,7 +541,7 @@ class Maker:
             levels += [(quickest, low), (1.0, low)]
             levels += [(0.5 * period, high), (0.5 * period, low)] * row["cycles"]
         told = [in_mm(stroke.at(goal)) for goal in row["goals"]]
-        facts |= {"lengths": told, "goals": _listed([f"{goal:g}" for goal in told])}
+        facts |= {"lengths": told, "goals": self.told.each(told, "mm")}
         facts["period"] = period
         length = _course(lengths, stroke.at(row["goals"][0]), stroke, self.dt)
         return self._driven(row, facts, self._pressures(levels, length.size), length=length)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pamrs.channels import dotted
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments._chains import Range, chains_of, is_sealed, joined, pressure_range
-from pamrs.experiments._experiment import Experiment, in_bar
+from pamrs.experiments._experiment import Experiment, Told, in_bar
 from pamrs.experiments._frame import Rates, Seen, frame_of, seen_in
 from pamrs.experiments._maker import Maker, rows
 from pamrs.recordings import Recording
@@ -44,7 +44,7 @@ def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experimen
     """Fills of all chambers, shut off and left alone; where lines join several chambers, also of
     one, which then blows over into the others.
     """
-    chambers, segments = list(rig.tables("chamber")), _segments(rig)
+    chambers, segments, told = list(rig.tables("chamber")), _segments(rig), Told(rig)
     out = []
     for row in [] if segments else rows("sealed"):  # waves would be followed for minutes
         pressure, seconds = span.at(row["at"]), row["seconds"]
@@ -52,8 +52,8 @@ def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experimen
         filled, it, its = ("the chamber", "it", "its") if one else ("all chambers", "them", "their")
         what = f"open {its} outlet" if _outlets(rig) else f"shut {it} off"
         text = (
-            f"fill {filled} to {in_bar(pressure):g} bar, {what} and record {seconds:g} s from "
-            "that moment"
+            f"fill {filled} to {told.each([in_bar(pressure)], 'bar')}, {what} and record "
+            f"{seconds:g} s from that moment"
         )
         begin = {dotted("muscle_pressure", chamber): pressure for chamber in chambers}
         out.append(_left_alone(row["name"], text, begin, seconds, sample_time))
@@ -68,8 +68,9 @@ def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experimen
         except SimulationError:
             continue  # the model does not hold there: nothing to propose to anyone
         text = (
-            f"fill {chamber} to {in_bar(span.high):g} bar and the rest to {in_bar(span.low):g} "
-            f"bar, open what lies between and record {seconds:.2g} s from that moment"
+            f"fill {chamber} to {told.each([in_bar(span.high)], 'bar')} and the rest to "
+            f"{told.each([in_bar(span.low)], 'bar')}, open what lies between and record "
+            f"{seconds:.2g} s from that moment"
         )
         step = max(_LEAST_SAMPLE_TIME, seconds / _MOST_BLOWN_SAMPLES)
         out.append(_left_alone(f"blow_over.{chamber}", text, begin, seconds, step))

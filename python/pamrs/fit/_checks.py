@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.units import parse_unit
+from pamrs.units import in_words, parse_unit
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
@@ -107,17 +107,20 @@ def check_units(
     """
     if not len(pressure):
         return
+    gas, metre = units.get("pressure", ""), units.get("length", "")
     top = float(np.max(pressure))
     low, high = _PRESSURE_USUAL
     if 0.0 < top < _PRESSURE_LOW:
         raise RecordingError(
-            f"{label}: pressure up to {top:.4g} Pa only, at which no muscle pulls: wrong unit? "
+            f"{label}: pressure up to {in_words(gas, 'Pa', top)} only, at which no muscle pulls: "
+            "wrong unit? "
             + _column_words("pressure", _slips("pressure", top / high, top / low, units))
         )
     if np.mean(pressure > PRESSURE_HIGH) > _STRAY:
         usual = float(np.quantile(pressure, 0.9))
         raise RecordingError(
-            f"{label}: pressures around {usual:.4g} Pa, beyond 5 MPa: wrong unit? "
+            f"{label}: pressures around {in_words(gas, 'Pa', usual)}, beyond "
+            f"{in_words(gas, 'Pa', PRESSURE_HIGH, digits='g')}: wrong unit? "
             + _column_words("pressure", _slips("pressure", usual / high, usual / low, units))
         )
     middle = float(np.median(np.abs(length))) / rest
@@ -138,8 +141,8 @@ def check_units(
             "rest_length and the length column"
         )
     raise RecordingError(
-        f"{label}: lengths up to {longest:.4g} m do not go with rest_length = {rest:g} m: wrong "
-        f"unit? {advice}"
+        f"{label}: lengths up to {in_words(metre, 'm', longest)} do not go with rest_length = "
+        f"{in_words(metre, 'm', rest)}: wrong unit? {advice}"
     )
 
 
@@ -179,9 +182,10 @@ def check_forces(label: str, largest: float, able: float, units: Mapping[str, st
 
     forces = blame("force", "large" if high else "small", *factors)
     pressures = blame("pressure", "small" if high else "large", 1.0 / factors[1], 1.0 / factors[0])
-    found = f"force up to {largest:.4g} N only, where the gas could pull {able:.4g} N"
+    top, most = (in_words(units.get("force", ""), "N", force) for force in (largest, able))
+    found = f"force up to {top} only, where the gas could pull {most}"
     if high:
-        found = f"force up to {largest:.4g} N, but the gas could pull {able:.4g} N at most"
+        found = f"force up to {top}, but the gas could pull {most} at most"
     raise RecordingError(
         f"{label}: {found}: wrong unit or wrong muscle? Either {forces}, or {pressures}, "
         f"or the muscle's sizes are too {'small' if high else 'large'}"
@@ -189,7 +193,7 @@ def check_forces(label: str, largest: float, able: float, units: Mapping[str, st
 
 
 def absolute_pressures(
-    pressure: Array, contraction: Array, force: Array, level: NDArray[np.intp]
+    pressure: Array, contraction: Array, force: Array, level: NDArray[np.intp], unit: str
 ) -> list[str]:
     """A note if the forces vanish near ambient pressure, as they do when the pressures are
     absolute.
@@ -203,6 +207,8 @@ def absolute_pressures(
         Used rows [Pa], [1], [N].
     level : (n,) int array
         Pressure level of each.
+    unit : str
+        That of the pressures in their file.
 
     Returns
     -------
@@ -229,6 +235,6 @@ def absolute_pressures(
     if not (_AMBIENT[0] <= vanish <= _AMBIENT[1] and error <= _SURE):
         return []
     return [
-        f"forces vanish near {vanish / 1e3:.3g} kPa at the longest lengths: are the pressures "
-        "absolute? gauge pressures are needed (subtract the ambient pressure)"
+        f"forces vanish near {in_words(unit, 'Pa', vanish)} at the longest lengths: are the "
+        "pressures absolute? gauge pressures are needed (subtract the ambient pressure)"
     ]

@@ -212,9 +212,9 @@ class ForceMap:
         map_._check_count()
         map_ = map_._with_levels(level_tolerance)
         pressure, contraction, force, level, _ = map_.used_rows()
-        return replace(
-            map_, notes=(*map_.notes, *absolute_pressures(pressure, contraction, force, level))
-        )
+        unit = map_.units.get("pressure", "")
+        told = absolute_pressures(pressure, contraction, force, level, unit)
+        return replace(map_, notes=(*map_.notes, *told))
 
     def _with_levels(self, tolerance: float | None) -> ForceMap:
         """The map with its pressure levels found from the used rows."""

@@ -100,7 +100,7 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
     if isinstance(block, Mapping):
         model = reader.block("muscle", with_moduli(block))
         if not reader.problems:
-            reader.problems += muscle_problems("muscle", model)
+            reader.problems += muscle_problems("muscle", model, reader.units)
     else:
         reader.problem("the block [muscle] is missing: the muscle's geometry, as in a rig file")
     if reader.problems:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import contraction_of, refused
+from pamrs._checks import contraction_of, matched, refused
 from pamrs._views import Panels, View
 from pamrs.errors import RecordingError
 from pamrs.findings import to_plain
@@ -121,10 +121,11 @@ class MapFit(View):
         Raises
         ------
         ParameterError
-            If not one of contraction and length is given.
+            If not one of contraction and length is given, or a number is not finite.
         """
         asked = contraction_of(contraction, length, self.rest_length)
-        return _predict(self.pressure, self.contraction, self.force, pressure, asked)
+        gas, e = matched(pressure=pressure, contraction=asked)
+        return _predict(self.pressure, self.contraction, self.force, gas, e)
 
     def to_muscle(self, muscle: Muscle) -> Muscle:
         """A muscle with this table.
@@ -288,12 +289,12 @@ def _levels(data: ForceMap) -> Array:
     return np.linspace(levels[0], levels[-1], _MOST_LEVELS)
 
 
-def _predict(pressure: Array, contraction: Array, force: Array, gas: Any, e: Any) -> Array:
+def _predict(pressure: Array, contraction: Array, force: Array, gas: Array, e: Array) -> Array:
     from pamrs.rig import force_table
 
-    p, x = np.broadcast_arrays(np.asarray(gas, dtype=float), np.asarray(e, dtype=float))
     found = force_table(pressure, contraction, force)
-    return found(np.ascontiguousarray(p.ravel()), np.ascontiguousarray(x.ravel())).reshape(p.shape)
+    flat = (np.ascontiguousarray(values.ravel()) for values in (gas, e))
+    return found(*flat).reshape(gas.shape)
 
 
 def _table(pressure: Array, contraction: Array, gas: Array, e: Array, pull: Array) -> Array:

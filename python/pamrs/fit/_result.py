@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import contraction_of, one_of, quantities
+from pamrs._checks import contraction_of, matched, one_of, quantities
 from pamrs._views import Panels, View
 from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError
@@ -137,11 +137,7 @@ class MuscleFit(View, FitStatistics):
         rest = self._estimate.blank.parameters["rest_length"]
         contraction = contraction_of(contraction, length, rest)
         way = 0.0 if direction is None else direction
-        given = (np.asarray(v, dtype=np.float64) for v in (pressure, contraction, way))
-        p, e, d = np.broadcast_arrays(*given)
-        for name, values in (("pressure", p), ("contraction", e), ("direction", d)):
-            if not np.isfinite(values).all():
-                raise ParameterError(f"{name} has a value that is not finite")
+        p, e, d = matched(pressure=pressure, contraction=contraction, direction=way)
         return p, e, d
 
     def outside(

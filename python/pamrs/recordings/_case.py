@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import as_said, one_of, plain, positive, refused
+from pamrs._checks import as_said, one_of, refused
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
 from pamrs._views import COLOURS, Curve, Panels, View, over_time
 from pamrs.channels import channel_of, unit_of
@@ -35,7 +35,7 @@ from pamrs.recordings._headed import load_recording
 from pamrs.recordings._in_memory import arrays_of
 from pamrs.recordings._recording import Issue, OwnValue, Recording
 from pamrs.recordings.logs import Log, Series, TextFormat, check_readable, read_log
-from pamrs.rig import Parameter, Rig, effect_parameter, load_rig
+from pamrs.rig import Parameter, Rig, check_sample_time, effect_parameter, load_rig
 from pamrs.units import to_si
 
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *LOG)
@@ -181,9 +181,7 @@ class Case(View):
             )
         written = dict(units or {})
         tables = arrays_of(recordings, held_out, written, sample_time)
-        spacing = sample_time
-        if spacing is not None:
-            spacing = positive("sample_time", plain("sample_time", spacing, "s"))
+        spacing = None if sample_time is None else check_sample_time(rig, sample_time)
         made = list[Recording]()
         for called, (table, own_units) in tables.items():
             said = own_units | written

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pamrs.channels import CHANNELS, channel_of, dotted, with_trait
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.units import bar_and_psi, from_si, parse_unit, to_si
+from pamrs.units import in_words, parse_unit, to_si
 
 if TYPE_CHECKING:
     from pamrs.recordings._recording import Recording
@@ -131,7 +131,7 @@ def suspicions(
         if kind in PRESSURES:
             found += _pressure(name, unit, channels, said, rig)
         elif kind in ("temperature", "ambient_temperature"):
-            found += _temperature(name, unit, values)
+            found += _temperature(name, unit, values, rig)
         elif kind in ("joint_angle", "length"):
             found += _range(name, unit, values, rig)
     return found
@@ -247,12 +247,13 @@ def _pressure(
         likely = _fitting(top, unit, reference, least if least else 0.02, most)
         if likely:
             turned = float(_other(top, unit, likely))
+            now, other = (_in_both(unit, "Pa", rig, value) for value in (top, reference))
             yield Suspicion(
                 name,
                 unit,
                 likely,
-                f"{name} is said to be in {unit}, so it would reach {_bar(top)}, against "
-                f"{_bar(reference)} of {what}; read as {likely} it reaches {_bar(turned)}",
+                f"{name} is said to be in {unit}, so it would reach {now}, against {other} of "
+                f"{what}; read as {likely} it reaches {_in_both(likely, 'Pa', rig, turned)}",
             )
             return
     yield from _absolute(name, unit, values, rig)
@@ -299,29 +300,34 @@ def _absolute(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[
             name,
             "gauge",
             "absolute",
-            f"{name} never falls below {_bar(low)} and rests there for {100 * rests:.0f} % of its "
-            f"samples: the ambient pressure, so its values are likely absolute and not gauge; "
-            f'unit = "{unit}(a)" makes them gauge',
+            f"{name} never falls below {in_words(unit, 'Pa', low)} and rests there for "
+            f"{100 * rests:.0f} % of its samples: the ambient pressure, so its values are likely "
+            f'absolute and not gauge; unit = "{unit}(a)" makes them gauge',
         )
     elif abs(low + ambient) < _NEAR * ambient:
         yield Suspicion(
             name,
             "absolute",
             "gauge",
-            f"{name} rests at {_bar(low)} for {100 * rests:.0f} % of its samples, a vacuum: its "
-            "values are gauge pressures already, and the ambient pressure was subtracted once "
-            "more",
+            f"{name} rests at {in_words(unit, 'Pa', low)} for {100 * rests:.0f} % of its samples, "
+            "a vacuum: its values are gauge pressures already, and the ambient pressure was "
+            "subtracted once more",
         )
 
 
-def _bar(pressure: float) -> str:
-    return f"{pressure / 1e5:.4g} bar"
+def _in_both(unit: str, si: str, rig: Rig | None, *values: float) -> str:
+    """Values in the unit of the log, and in brackets in that of the rig file where that is
+    another.
+    """
+    own = unit if rig is None else rig.units.usual(si)
+    said = in_words(unit, si, *values)
+    return said if _as_large(own, unit) else f"{said} ({in_words(own, si, *values)})"
 
 
 # ------------------------------------------------------------- temperature, motion
 
 
-def _temperature(name: str, unit: str, values: Array) -> Iterator[Suspicion]:
+def _temperature(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Suspicion]:
     middle = float(np.nanmedian(values))
     for other in ("degC", "K", "degF"):
         turned = float(_other(middle, unit, other))
@@ -330,8 +336,9 @@ def _temperature(name: str, unit: str, values: Array) -> Iterator[Suspicion]:
                 name,
                 unit,
                 other,
-                f"{name} is said to be in {unit}, so it would be {middle:.4g} K "
-                f"({middle - 273.15:.4g} degC); read as {other} it is {turned - 273.15:.4g} degC",
+                f"{name} is said to be in {unit}, so it would be "
+                f"{_in_both(unit, 'K', rig, middle)}; read as {other} it is "
+                f"{_in_both(other, 'K', rig, turned)}",
             )
             return
 
@@ -339,7 +346,6 @@ def _temperature(name: str, unit: str, values: Array) -> Iterator[Suspicion]:
 def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Suspicion]:
     """An angle or a length beside the ends that the rig file gives, else beside the possible."""
     angle = channel_of(name) == "joint_angle"
-    shown, dimension = ("deg", "angle") if angle else ("mm", "length")
     given = limits_of(rig, name)
     low, high = given or ((-2.0 * np.pi, 2.0 * np.pi) if angle else (1e-3, 10.0))
     slack = _SLACK * (high - low) if given else 0.0
@@ -356,9 +362,10 @@ def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Sus
         first, last = (float(_other(edge, unit, other)) for edge in (bottom, top))
         if fits(first, last) and last - first > 5.0 * (top - bottom) * fits(bottom, top):
             ends = "the rig file allows" if given else "possible are"
+            si = "rad" if angle else "m"
+            own = unit if rig is None else rig.units.usual(si)
             now, then, wide = (
-                f"{from_si(a, shown, dimension):.4g} to {from_si(b, shown, dimension):.4g} {shown}"
-                for a, b in ((bottom, top), (first, last), (low, high))
+                in_words(own, si, *ends) for ends in ((bottom, top), (first, last), (low, high))
             )
             yield Suspicion(
                 name,
@@ -446,7 +453,7 @@ def _pressure_unit(
     return fitting[0], numbers + others
 
 
-def subtracted(recorded: Array | None, stated: float | None) -> tuple[float, str]:
+def subtracted(recorded: Array | None, stated: float | None, unit: str) -> tuple[float, str]:
     """What makes gauge pressures of absolute ones.
 
     Parameters
@@ -455,6 +462,8 @@ def subtracted(recorded: Array | None, stated: float | None) -> tuple[float, str
         Recorded ambient pressure [Pa].
     stated : float or None
         That of the rig file [Pa].
+    unit : str
+        Of the log, for the words.
 
     Returns
     -------
@@ -469,8 +478,8 @@ def subtracted(recorded: Array | None, stated: float | None) -> tuple[float, str
     if recorded is not None and np.isfinite(recorded).any():
         ambient, whose = float(np.nanmedian(recorded)), "the recorded ambient pressure,"
         if stated is not None and abs(ambient - stated) > _AMBIENT_OFF * stated:
-            whose += f" where the rig file says {bar_and_psi(stated)},"
-    return ambient, f"{whose} {bar_and_psi(ambient)}, is subtracted"
+            whose += f" where the rig file says {in_words(unit, 'Pa', stated)},"
+    return ambient, f"{whose} {in_words(unit, 'Pa', ambient)}, is subtracted"
 
 
 def made_gauge(
@@ -496,13 +505,11 @@ def made_gauge(
     names = [name for name in absolute if channel_of(name) != "ambient_pressure"]
     if not names:
         return recording
-    ambient, said = subtracted(recording.channels.get("ambient_pressure"), stated)
-    note = f"was recorded as an absolute pressure: {said}"
-    channels = {
-        name: values - ambient if name in names else values
-        for name, values in recording.channels.items()
-    }
-    notes = recording.notes | {
-        name: "; ".join([*filter(None, [recording.notes.get(name)]), note]) for name in names
-    }
+    channels, notes = dict(recording.channels), dict(recording.notes)
+    room = channels.get("ambient_pressure")
+    for name in names:
+        ambient, said = subtracted(room, stated, recording.said.get(name, ""))
+        channels[name] = channels[name] - ambient
+        note = f"was recorded as an absolute pressure: {said}"
+        notes[name] = "; ".join([*filter(None, [notes.get(name)]), note])
     return replace(recording, channels=channels, notes=notes)

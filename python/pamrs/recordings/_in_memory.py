@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import as_said, is_quantity, plain
+from pamrs._checks import as_said, is_quantity, misshapen, plain
 from pamrs.channels import unit_of
 from pamrs.errors import CaseError, ParameterError, joined
 from pamrs.recordings._headed import HEADING
@@ -16,6 +16,7 @@ from pamrs.recordings._headed import HEADING
 Array = NDArray[np.float64]
 _NUMBERS = "biuf"  # kinds of arrays that are numbers
 _DATES = "mM"  # kinds that are times
+_MIXED = "OU"  # kinds that may be numbers among other things
 
 
 class Arrays(NamedTuple):
@@ -156,24 +157,31 @@ def _array(problems: list[str], label: str, values: Any, *, dates: bool) -> Arra
     masked = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
     array = np.asarray(values)
     if dates and array.size:
-        since = array - array[0] if array.dtype.kind == "M" else array
+        since = array - np.fmin.reduce(array) if array.dtype.kind == "M" else array
         array = since / np.timedelta64(1, "s")
-    if array.dtype.kind == "O":
-        try:
-            array = array.astype(np.float64)
-        except (TypeError, ValueError):
-            problems.append(f"{label} has values that are no numbers, such as {as_said(array[0])}")
-            return None
-    if array.dtype.kind not in _NUMBERS or array.ndim != 1 or array.size == 0:
-        problems.append(
-            f"{label} has the type {array.dtype} and the shape {array.shape}: numbers in one row, "
-            "one at least, are needed"
-        )
+    mixed = array.flat if array.dtype.kind in _MIXED else ()
+    if wrong := [value for value in mixed if not _is_number(value)]:
+        problems.append(f"{label} has values that are no numbers, such as {as_said(wrong[0])}")
+        return None
+    array = array.astype(np.float64) if array.dtype.kind == "O" else array
+    if array.dtype.kind not in _NUMBERS:
+        problems.append(f"{label} has the type {array.dtype}: numbers are needed")
+        return None
+    if array.ndim != 1 or array.size == 0:
+        problems.append(str(misshapen(label, array.shape)))
         return None
     found = array.astype(np.float64)
     if masked is not None:
         found[masked] = np.nan
     return found
+
+
+def _is_number(value: Any) -> bool:
+    """Whether something is a number, or nothing where one was not measured."""
+    try:
+        return value is None or float(value) is not None
+    except (TypeError, ValueError):
+        return False
 
 
 def _names(

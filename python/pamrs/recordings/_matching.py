@@ -295,11 +295,14 @@ def _measures(written: Written, channel: str) -> bool:
 def _made_gauge(matches: list[Match], rig: Rig | None) -> tuple[list[Match], list[str]]:
     """Absolute pressures with what is subtracted from them, and words that say so."""
     recorded = next((each.si() for each in matches if each.channel == "ambient_pressure"), None)
-    ambient, said = subtracted(recorded, None if rig is None else ambient_of(rig))
-    absolute = [each.absolute and each.channel != "ambient_pressure" for each in matches]
-    pairs = list(zip(matches, absolute, strict=True))
-    found = [replace(each, subtracted=ambient) if its else each for each, its in pairs]
-    return found, [f"{m.series.name} is an absolute pressure: {said}" for m, its in pairs if its]
+    stated = None if rig is None else ambient_of(rig)
+    found, told = list(matches), []
+    for k, each in enumerate(matches):
+        if each.absolute and each.channel != "ambient_pressure":
+            ambient, said = subtracted(recorded, stated, each.unit)
+            found[k] = replace(each, subtracted=ambient)
+            told.append(f"{each.series.name} is an absolute pressure: {said}")
+    return found, told
 
 
 def _role(series: Series) -> str:

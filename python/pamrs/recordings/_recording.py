@@ -27,6 +27,7 @@ from pamrs.recordings._clock import Grid, lay_grid
 from pamrs.recordings._doubts import suspicions
 from pamrs.recordings._faults import Fault, find_faults
 from pamrs.rig import full_name, named_entries
+from pamrs.units import in_words
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
@@ -439,12 +440,12 @@ def _judged(
     impossible = usable & ((values < limits.lower) | (values > limits.upper))
     bad = int(impossible.sum())
     if bad > max(3, len(values) // 50):
-        worst = float(values[impossible][0])
+        worst = in_words(said, limits.unit, float(values[impossible][0]), digits=".6g")
+        ends = in_words(said, limits.unit, limits.lower, limits.upper)
         likely = "".join(f" {one.text}" for one in suspicions({channel: values}, {channel: said}))
         raise RecordingError(
-            f"{source}: column {channel!r}: {worst:.6g} {limits.unit} and {bad - 1} more values "
-            f"are not possible ({limits.lower:g} to {limits.upper:g} {limits.unit}); right column "
-            f"and unit?{likely}"
+            f"{source}: column {channel!r}: {worst} and {bad - 1} more values are not possible "
+            f"({ends}); right column and unit?{likely}"
         )
     found = _runs(~usable, "nan", "no value")
     found += _runs(impossible, "outlier", "an impossible value")

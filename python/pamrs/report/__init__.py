@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from pathlib import Path
+from types import ModuleType
 
 from pamrs._writing import write_atomically
 from pamrs.findings import Findings
 
-__all__ = ["render_html", "write_figure", "write_page", "write_report"]
+__all__ = ["motion", "render_html", "write_figure", "write_page", "write_report"]
 
 
 def render_html(diagnosis: Findings) -> str:
@@ -35,3 +37,9 @@ def write_figure(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
     from pamrs.report.pictures import summary_png
 
     return write_atomically(path, summary_png(diagnosis))
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name != "motion":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return importlib.import_module("pamrs.report.motion")

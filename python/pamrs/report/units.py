@@ -6,17 +6,17 @@ import math
 
 from pamrs.findings import Misread
 from pamrs.report.text import listed
-from pamrs.units import bar_and_psi
+from pamrs.units import in_words
 
 
-def misread_sentence(entry: Misread) -> str:
-    """What is likely, and the evidence."""
+def misread_sentence(entry: Misread, unit: str) -> str:
+    """What is likely, and the evidence, in the unit of the log."""
     names, many = listed(entry.channels), len(entry.channels) > 1
     verb = "are" if many else "is"
     if entry.offset:
         what = (
             f"{names} {verb} likely {entry.likely} and not {entry.said}: with "
-            f"{bar_and_psi(abs(entry.offset))} "
+            f"{in_words(unit, 'pressure', abs(entry.offset))} "
             f"{'taken off' if entry.offset < 0.0 else 'added'}"
         )
     else:

@@ -14,8 +14,16 @@ from pamrs.rig._joint import Joint
 from pamrs.rig._law import force_table
 from pamrs.rig._muscle import Muscle
 from pamrs.rig._reader import Reader
-from pamrs.rig._rig import Parameter, Rig, load_rig, parse_rig, payload_of
+from pamrs.rig._rig import (
+    Parameter,
+    Rig,
+    check_sample_time,
+    load_rig,
+    parse_rig,
+    payload_of,
+)
 from pamrs.rig._switching import effect_parameter, full_name, named_entries
+from pamrs.rig._units import Units
 
 __all__ = [
     "Joint",
@@ -23,6 +31,8 @@ __all__ = [
     "Parameter",
     "Reader",
     "Rig",
+    "Units",
+    "check_sample_time",
     "effect_parameter",
     "force_table",
     "full_name",

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.rig._ports import Ports
+from pamrs.rig._units import Units
 from pamrs.rig.schema import qualified, split_name, tables_of
-from pamrs.units import with_unit
+from pamrs.units import from_si
 
 if TYPE_CHECKING:
     from pamrs.rig._muscle import Muscle
@@ -47,7 +48,11 @@ _STIFFEST: Final = 5e6  # modulus of the stiffest rubber that bladders are made 
 
 
 def cautions_of(
-    model: Mapping[str, Any], ports: Ports, parameters: Mapping[str, Parameter], text: str = ""
+    model: Mapping[str, Any],
+    ports: Ports,
+    parameters: Mapping[str, Parameter],
+    units: Units,
+    text: str = "",
 ) -> list[str]:
     """What of a model is possible, and most likely a mistake.
 
@@ -59,6 +64,8 @@ def cautions_of(
         What its blocks are connected to.
     parameters : mapping of str to Parameter
         Its parameters by dotted name.
+    units : Units
+        Those of its file.
     text : str
         The file, as its author wrote it; empty where there is none.
 
@@ -70,12 +77,16 @@ def cautions_of(
     found = _unfed(model, ports)
     for name, valve in tables_of(model, "valve").items():
         label = qualified("valve", name)
-        found += _shut(label, valve)
-        found += _late(label, valve)
+        found += _shut(label, valve, units)
+        found += _late(label, valve, units)
     for name, muscle in tables_of(model, "muscle").items():
-        found += _strut(qualified("muscle", name), muscle)
-    found += [*_limitless(model), *_strokes(model, ports), *_slack(model, ports, text)]
-    return [*found, *_frictionless(parameters), *_exact(parameters)]
+        found += _strut(qualified("muscle", name), muscle, units)
+    found += [
+        *_limitless(model, units),
+        *_strokes(model, ports, units),
+        *_slack(model, ports, text, units),
+    ]
+    return [*found, *_frictionless(parameters, units), *_exact(parameters, units)]
 
 
 def _highest(model: Mapping[str, Any]) -> float | None:
@@ -86,20 +97,20 @@ def _highest(model: Mapping[str, Any]) -> float | None:
     return limit or max(full, default=0.0) or None
 
 
-def _limitless(model: Mapping[str, Any]) -> list[str]:
+def _limitless(model: Mapping[str, Any], units: Units) -> list[str]:
     """Muscles of which nobody says what pressure they bear."""
     if not tables_of(model, "muscle") or "max_pressure" in model.get("limits", {}):
         return []
-    highest = _highest(model)
-    bar = "" if highest is None else f"the {highest / 1e5:.4g} bar of "
+    highest, unit = _highest(model), units.usual("Pa")
+    most = "" if highest is None else f"the {units.said('', 'Pa', highest)} of "
     return [
         "limits.max_pressure is missing: nothing says which pressure the muscles bear, and "
-        f"simulations go up to {bar}the supply without a word; [limits] with max_pressure = "
-        '{ value = ..., unit = "bar" } says it'
+        f"simulations go up to {most}the supply without a word; [limits] with max_pressure = "
+        f'{{ value = ..., unit = "{unit}" }} says it'
     ]
 
 
-def _strokes(model: Mapping[str, Any], ports: Ports) -> list[str]:
+def _strokes(model: Mapping[str, Any], ports: Ports, units: Units) -> list[str]:
     """Muscles that are too long or too short for what their joint asks of them."""
     from pamrs.rig._joint import Joint
     from pamrs.rig._muscle import Muscle
@@ -116,40 +127,42 @@ def _strokes(model: Mapping[str, Any], ports: Ports) -> list[str]:
         if not way.reaches(angles).all():
             continue  # an error, when the rig is used
         muscle = Muscle.from_model(tables_of(model, "muscle")[name])
-        found += _stroke(
-            qualified("muscle", name), ends["joint"], muscle, way.shortening(angles), model
-        )
+        own = qualified("muscle", name), ends["joint"], muscle, way.shortening(angles)
+        found += _stroke(*own, _highest(model), units)
     return found
 
 
 def _stroke(
-    label: str, joint: str, muscle: Muscle, shortening: Array, model: Mapping[str, Any]
+    label: str, joint: str, muscle: Muscle, shortening: Array, highest: float | None, units: Units
 ) -> list[str]:
-    """What is odd about how far a joint shortens a muscle [m] between its stops."""
-    rest = float(muscle.parameters["rest_length"])
+    """What is odd about how far a joint shortens a muscle [m] between its stops, at the highest
+    pressure [Pa].
+    """
+    rest, own = float(muscle.parameters["rest_length"]), f"{label}.rest_length"
     low, high = float(shortening.min()), float(shortening.max())
     if high - low < _LEAST_STROKE * rest:
         share = 100 * (high - low) / rest
         return [
             f"{label} is long for its joint: between its stops {joint} shortens it by "
-            f"{1e3 * (high - low):.3g} mm, {share:.2g} % of {label}.rest_length = "
-            f"{1e3 * rest:.4g} mm; are all lengths in the unit that they say?"
+            f"{units.said(own, 'm', high - low, digits='.3g')}, {share:.2g} % of {own} = "
+            f"{units.said(own, 'm', rest)}; are all lengths in the unit that they say?"
         ]
     first, last = muscle.contraction_range
     found = []
     if first <= low / rest < 0.0 and bool(muscle.braid_taut(low / rest)):
         found.append(
-            f"{label} is stretched by {-1e3 * low:.3g} mm at a stop of {joint}, where its braid is "
+            f"{label} is stretched by {units.said(own, 'm', -low, digits='.3g')} at a stop of "
+            f"{joint}, where its braid is "
             "taut: the joint's rest_angle is the angle at which muscles have their rest length"
         )
-    highest = _highest(model)
     if highest is not None and high / rest <= last:
         grid = np.linspace(0.0, last, _ANGLES)
         free = float(grid[muscle.force_table(highest, grid) >= 0.0].max(initial=0.0))
         if free < high / rest:
             found.append(
                 f"{label} is short for its joint: at a stop of {joint} it is shortened by "
-                f"{100 * high / rest:.3g} %, and at {highest / 1e5:.4g} bar it pulls up to "
+                f"{100 * high / rest:.3g} %, and at {units.said('', 'Pa', highest)} it pulls up "
+                "to "
                 f"{100 * free:.3g} % only"
             )
     return found
@@ -175,7 +188,7 @@ def _unfed(model: Mapping[str, Any], ports: Ports) -> list[str]:
     ]
 
 
-def _frictionless(parameters: Mapping[str, Parameter]) -> list[str]:
+def _frictionless(parameters: Mapping[str, Parameter], units: Units) -> list[str]:
     """Friction and damping that are nothing, exactly: effects with the same law would be named in
     their place.
     """
@@ -183,11 +196,12 @@ def _frictionless(parameters: Mapping[str, Parameter]) -> list[str]:
     for name, usual in _usual_friction(parameters).items():
         known = parameters[name]
         if known.value == known.tol == 0.0:
-            size = f"{usual:.2g}" if usual else "..."
+            unit = units.of(name, known.unit)
+            size = f"{from_si(usual, unit, known.unit):.2g}" if usual else "..."
             found.append(
-                f"{name} = 0 {known.unit}, exactly: no laboratory knows that, and a diagnosis "
+                f"{name} = 0 {unit}, exactly: no laboratory knows that, and a diagnosis "
                 "would call it missing physics; write what is known of it, such as "
-                f'{{ value = {size}, unit = "{known.unit}", tol = {size} }}'
+                f'{{ value = {size}, unit = "{unit}", tol = {size} }}'
             )
     return found
 
@@ -216,28 +230,26 @@ def _usual_friction(parameters: Mapping[str, Parameter]) -> dict[str, float]:
     return found
 
 
-def _exact(parameters: Mapping[str, Parameter]) -> list[str]:
+def _exact(parameters: Mapping[str, Parameter], units: Units) -> list[str]:
     """Measured values without a tolerance, where others have one."""
     if not any(known.tol for known in parameters.values()):
         return ["no value has a tolerance (tol): a diagnosis would take all of them as exact"]
-    found = {}
+    told = []
     for name, known in parameters.items():
         block, _, key = split_name(name)
         share = _MEASURED.get((block, key))
         if share and known.value and not known.tol:
-            found[name] = share * abs(known.value), known.unit
-    if not found:
+            tol = units.said(name, known.unit, share * abs(known.value), digits=".2g")
+            told.append(f"{name} (tol = {tol})")
+    if not told:
         return []
-    told = [
-        f"{name} (tol = {with_unit(f'{tol:.2g}', unit)})" for name, (tol, unit) in found.items()
-    ]
     return [
         f"known exactly, as no laboratory knows it: {', '.join(told)} would be usual; what a "
         "diagnosis may not move it explains with effects"
     ]
 
 
-def _shut(label: str, valve: Mapping[str, Any]) -> list[str]:
+def _shut(label: str, valve: Mapping[str, Any], units: Units) -> list[str]:
     """A valve that no command opens."""
     if valve["fraction"][-1] == 0.0:
         return [
@@ -250,19 +262,21 @@ def _shut(label: str, valve: Mapping[str, Any]) -> list[str]:
     if any(valve.get(f"{way}_conductance", 1.0) > 0.0 for way in ways):
         return []
     said = [f"{label}.{key} = {position!r}" for key, position in positions.items()]
-    said += [f"{label}.{way}_conductance = 0 m3/(s Pa)" for way in ways]
+    closed = [f"{label}.{way}_conductance" for way in ways]
+    said += [f"{name} = {units.said(name, 'm3/(s Pa)', 0.0)}" for name in closed]
     return [f"{label} never passes air: {', '.join(said)}"]
 
 
-def _strut(label: str, muscle: Mapping[str, Any]) -> list[str]:
+def _strut(label: str, muscle: Mapping[str, Any], units: Units) -> list[str]:
     """A muscle that pushes more than a rod of rubber as thick as it can bear, held at both ends."""
     load, most = muscle["buckling_load"], _borne(muscle)
     if load <= most:
         return []
+    name = f"{label}.buckling_load"
     return [
-        f"{label} pushes without air, by up to {label}.buckling_load = {load:.4g} N: a solid rod "
-        f"of rubber as thick and long bows out at {most:.2g} N, a muscle before; 0 N for one that "
-        "goes slack"
+        f"{label} pushes without air, by up to {name} = {units.said(name, 'N', load)}: a solid rod "
+        f"of rubber as thick and long bows out at {units.said(name, 'N', most, digits='.2g')}, a "
+        "muscle before; 0 for one that goes slack"
     ]
 
 
@@ -272,7 +286,7 @@ def _borne(muscle: Mapping[str, Any]) -> float:
     return float(4.0 * math.pi**2 * _STIFFEST * bent / muscle["rest_length"] ** 2)
 
 
-def _slack(model: Mapping[str, Any], ports: Ports, text: str) -> list[str]:
+def _slack(model: Mapping[str, Any], ports: Ports, text: str, units: Units) -> list[str]:
     """Muscles that are slack without air because the file says nothing else, where their force
     model alone pushes back: a file of the time when they did may rely on it.
     """
@@ -290,10 +304,11 @@ def _slack(model: Mapping[str, Any], ports: Ports, text: str) -> list[str]:
         last = min(_most_contracted(model, ports, name), muscle.contraction_range[1])
         push = -float(muscle.force_table(0.0, np.linspace(0.0, max(last, 0.0), _ANGLES)).min())
         if push > _borne(table):
+            name = f"{label}.buckling_load"
             found.append(
-                f"{label} is slack without air, since {label}.buckling_load is not given, and its "
-                f"force model alone would push back by up to {push:.3g} N: a model that relies on "
-                "that lags where the muscle is slack; buckling_load says what it bears without air "
+                f"{label} is slack without air, since {name} is not given, and its force model "
+                f"alone would push back by up to {units.said(name, 'N', push)}: a model that relies "
+                "on that lags where the muscle is slack; buckling_load says what it bears without air "
                 "(0 N: nothing)"
             )
     return found
@@ -316,25 +331,30 @@ def _most_contracted(model: Mapping[str, Any], ports: Ports, name: str) -> float
     return float(way.shortening(there).max(initial=0.0)) / rest
 
 
-def _late(label: str, valve: Mapping[str, Any]) -> list[str]:
+def _late(label: str, valve: Mapping[str, Any], units: Units) -> list[str]:
     """A pulsed valve whose delays are as long as a period of its carrier."""
     if not valve.get("carrier_frequency"):
         return []
     period = 1.0 / valve["carrier_frequency"]
     delays = {key: valve[key] for key in ("opening_delay", "closing_delay")}
-    told = f"the period of {label}.carrier_frequency ({1e3 * period:.4g} ms) or longer"
+
+    def said(seconds: float, key: str) -> str:
+        return units.said(f"{label}.{key}", "s", seconds)
+
+    told = f"the period of {label}.carrier_frequency ({said(period, 'opening_delay')}) or longer"
     follows = {
         "opening_delay": "no pulse moves it, only a duty of 1 does",
         "closing_delay": "no gap lets it return, only a duty of 0 does",
     }
     found = [
-        f"{label}.{key} = {1e3 * delay:.4g} ms is {told}: {follows[key]}"
+        f"{label}.{key} = {said(delay, key)} is {told}: {follows[key]}"
         for key, delay in delays.items()
         if delay >= period
     ]
     if found or sum(delays.values()) < period:
         return found
     return [
-        f"{label}.opening_delay + {label}.closing_delay = {1e3 * sum(delays.values()):.4g} ms is "
-        f"{told}: no duty makes it open and close in a period"
+        f"{label}.opening_delay + {label}.closing_delay = "
+        f"{said(sum(delays.values()), 'opening_delay')} is {told}: no duty makes it open and close "
+        "in a period"
     ]

@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+from pamrs.rig._units import Units
 from pamrs.rig.schema import BLOCKS, qualified, tables_of
 
 
-def block_problems(model: Mapping[str, Any]) -> list[str]:
+def block_problems(model: Mapping[str, Any], units: Units) -> list[str]:
     """Problems within the blocks of a model.
 
     Parameters
@@ -17,6 +18,8 @@ def block_problems(model: Mapping[str, Any]) -> list[str]:
     model : mapping
         As :attr:`pamrs.Rig.model`; a table with a value that could not be read (None) is passed
         over.
+    units : Units
+        Those of the file.
 
     Returns
     -------
@@ -28,16 +31,16 @@ def block_problems(model: Mapping[str, Any]) -> list[str]:
         check = _CHECKS.get(block)
         for name, table in tables_of(model, block).items():
             if check is not None and None not in table.values():
-                problems += check(qualified(block, name), table)
+                problems += check(qualified(block, name), table, units)
     gas = model["gas"]
     if gas is not None and gas["ambient_pressure"] is not None:
-        problems += _vacuum(model, gas["ambient_pressure"])
+        problems += _vacuum(model, gas["ambient_pressure"], units)
     return problems
 
 
-def muscle_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
+def muscle_problems(label: str, muscle: Mapping[str, Any], units: Units) -> list[str]:
     """What does not go together in a muscle; ``label`` is what the block is called,
-    ``"muscle.flexor"``.
+    ``"muscle.flexor"``, and ``units`` are those of its file.
     """
     problems = []
     slope, offset = muscle.get("modulus_slope", []), muscle.get("modulus_offset", [])
@@ -54,15 +57,16 @@ def muscle_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
     if muscle.get("softening", 0.0) * warmer > 1.0:
         side = "above" if warmer > 0.0 else "below"
         problems.append(
-            f"{label}.softening = {muscle['softening']:g} 1/K is not allowed: a size of at most "
-            f"{1.0 / abs(warmer):.4g} 1/K is needed, {abs(warmer):.4g} K {side} "
-            f"{label}.reference_temperature"
+            f"{label}.softening = {units.said(f'{label}.softening', '1/K', muscle['softening'])} "
+            f"is not allowed: a size of at most {1.0 / abs(warmer):.4g} 1/K is needed, "
+            f"{abs(warmer):.4g} K {side} {label}.reference_temperature"
         )
     thickness, diameter = muscle["wall_thickness"], muscle["rest_diameter"]
     if not thickness < diameter / 2:
         problems.append(
-            f"{label}.wall_thickness = {thickness:g} m is not allowed: "
-            f"less than half of {label}.rest_diameter = {diameter:g} m is needed"
+            f"{label}.wall_thickness = {units.said(f'{label}.wall_thickness', 'm', thickness)} is "
+            f"not allowed: less than half of {label}.rest_diameter = "
+            f"{units.said(f'{label}.rest_diameter', 'm', diameter)} is needed"
         )
     return problems
 
@@ -86,7 +90,7 @@ def _map_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
     return problems
 
 
-def _valve(label: str, valve: Mapping[str, Any]) -> list[str]:
+def _valve(label: str, valve: Mapping[str, Any], units: Units) -> list[str]:
     """What is wrong with a valve's area table and its positions."""
     problems = _positions(label, valve)
     opening, fraction, label = valve["opening"], valve["fraction"], f"{label}.area_fraction"
@@ -119,17 +123,17 @@ def _positions(label: str, valve: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _rising(label: str, table: Mapping[str, Any], low: str, high: str, unit: str) -> list[str]:
+def _rising(
+    label: str, table: Mapping[str, Any], units: Units, *, low: str, high: str, unit: str
+) -> list[str]:
     """Limits of a range that are the wrong way round."""
     if table[low] < table[high]:
         return []
-    return [
-        f"{label}.{high} = {table[high]:g} {unit} is not allowed: more than {label}.{low} = "
-        f"{table[low]:g} {unit} is needed"
-    ]
+    least, most = (units.said(f"{label}.{end}", unit, table[end]) for end in (low, high))
+    return [f"{label}.{high} = {most} is not allowed: more than {label}.{low} = {least} is needed"]
 
 
-def _link(label: str, link: Mapping[str, Any]) -> list[str]:
+def _link(label: str, link: Mapping[str, Any], units: Units) -> list[str]:
     """A link that nothing holds against its joint: the arm's mass matrix could not be solved."""
     carried = link["mass"] * link["centre"] ** 2 + link["payload"] * link["length"] ** 2
     if link["inertia"] + carried > 0.0:
@@ -140,18 +144,21 @@ def _link(label: str, link: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _vacuum(model: Mapping[str, Any], ambient: float) -> list[str]:
+def _vacuum(model: Mapping[str, Any], ambient: float, units: Units) -> list[str]:
     """Chambers that begin below vacuum."""
-    start = {name: table["initial_pressure"] for name, table in tables_of(model, "chamber").items()}
-    return [
-        f"{qualified('chamber', name)}.initial_pressure = {pressure:g} Pa (gauge) is not allowed: "
-        f"more than -gas.ambient_pressure = {-ambient:g} Pa is needed"
-        for name, pressure in start.items()
-        if pressure is not None and not pressure > -ambient
-    ]
+    found = []
+    for name, table in tables_of(model, "chamber").items():
+        label = f"{qualified('chamber', name)}.initial_pressure"
+        pressure = table["initial_pressure"]
+        if pressure is not None and not pressure > -ambient:
+            found.append(
+                f"{label} = {units.said(label, 'Pa', pressure)} (gauge) is not allowed: more than "
+                f"-gas.ambient_pressure = {units.said(label, 'Pa', -ambient)} is needed"
+            )
+    return found
 
 
-_CHECKS: dict[str, Callable[[str, Mapping[str, Any]], list[str]]] = {
+_CHECKS: dict[str, Callable[[str, Mapping[str, Any], Units], list[str]]] = {
     "valve": _valve,
     "muscle": muscle_problems,
     "joint": partial(_rising, low="min_angle", high="max_angle", unit="rad"),

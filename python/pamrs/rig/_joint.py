@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import doubt_pascals, finite, plain, quantities
+from pamrs._checks import as_numbers, doubt_pascals, finite, plain, quantities
 from pamrs.rig._muscle import Muscle
 from pamrs.rig.schema import SPRING, STOPS
 
@@ -202,7 +202,7 @@ class Joint:
 
     @staticmethod
     def _over(function: Callable[[Array], Array], angle: ArrayLike) -> Array:
-        values = np.asarray(plain("angle", angle, "rad"), dtype=np.float64)
+        values = as_numbers("angle", plain("angle", angle, "rad"))
         return function(np.ascontiguousarray(values.ravel())).reshape(values.shape)
 
     def __reduce__(self) -> tuple[Any, ...]:

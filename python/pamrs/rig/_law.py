@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import refused
+from pamrs._checks import positive, rising
 from pamrs.errors import ParameterError
 
 Array = NDArray[np.float64]
@@ -54,10 +53,9 @@ def compiled_law(
     tolerance: float,
 ) -> dict[str, Any]:
     """What :meth:`pamrs.Muscle.from_law` gives to the muscle: axes and forces of a table."""
-    low, high = _range("pressure", pressure, -101_325.0, _HIGHEST, "Pa")
-    short, far = _range("contraction", contraction, -1.0, 1.0, "")
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise refused("tolerance", tolerance, "a positive number")
+    low, high = rising("pressure", pressure, -101_325.0, _HIGHEST, "Pa")
+    short, far = rising("contraction", contraction, -1.0, 1.0, "")
+    positive("tolerance", tolerance)
     size = list(_FIRST)
     while True:
         axes = np.linspace(low, high, size[0]), np.linspace(short, far, size[1])
@@ -78,19 +76,6 @@ def compiled_law(
                 f"force away, tolerance = {tolerance:g} is asked for; a jump of the law, perhaps"
             )
         size[axis] = 2 * size[axis] - 1
-
-
-def _range(
-    name: str, given: tuple[float, float], lowest: float, highest: float, unit: str
-) -> tuple[float, float]:
-    try:
-        low, high = (float(value) for value in given)
-    except (TypeError, ValueError):
-        low = high = math.nan
-    if not lowest <= low < high <= highest:
-        what = f"two numbers from {lowest:g} to {highest:g} {unit}".rstrip()
-        raise refused(name, given, f"{what}, the first one smaller")
-    return low, high
 
 
 def _asked(law: Callable[[Array, Array], ArrayLike], pressure: Array, contraction: Array) -> Array:

@@ -10,9 +10,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import contraction_of, doubt, doubt_pascals, finite, plain, quantities, refused
+from pamrs._checks import (
+    as_numbers,
+    checked_number,
+    contraction_of,
+    doubt,
+    doubt_pascals,
+    finite,
+    matched,
+    plain,
+    quantities,
+    refused,
+)
 from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
+from pamrs.rig.schema import keys_of
 
 Array = NDArray[np.float64]
 _LISTS = (
@@ -142,10 +154,12 @@ class Muscle:
         lists = {name: [float(v) for v in given[name]] for name in _LISTS}
         shape = own_geometry(model) if geometry is None else geometry
         self._model: dict[str, Any] = given | lists | {"geometry": shape}
-        for name, value in self._model.items():
-            for entry in value if isinstance(value, list) else [value]:
-                if isinstance(entry, (float, np.floating)):
-                    finite(f"muscle.{name}", entry)
+        for key in keys_of("muscle", self._model):
+            label, value = f"muscle.{key.name}", self._model[key.name]
+            if key.kind == "scalar":
+                checked_number(label, value, key.lower, key.upper, key.unit)
+            for entry in value if key.kind == "vector" else ():
+                finite(label, entry)
         if len(self._model["extension_factors"]) != 3:
             raise refused(
                 "muscle.extension_factors", list(extension_factors), "three numbers are needed"
@@ -493,7 +507,7 @@ class Muscle:
         ndarray
             A pull as it is, a push as far as ``buckling_load``, in the shape of ``force``.
         """
-        straight = np.asarray(force, dtype=np.float64)
+        (straight,) = matched(force=force)
         held = self._core.buckled(np.ascontiguousarray(straight.ravel()))
         return np.asarray(held.reshape(straight.shape))
 
@@ -525,7 +539,7 @@ class Muscle:
 
     @staticmethod
     def _over(function: Callable[[Array], Array], contraction: ArrayLike) -> Array:
-        e = np.asarray(plain("contraction", contraction, "1"), dtype=np.float64)
+        e = as_numbers("contraction", plain("contraction", contraction, "1"))
         return function(np.ascontiguousarray(e.ravel())).reshape(e.shape)
 
     def _forces(
@@ -538,9 +552,9 @@ class Muscle:
     ) -> Array:
         rest = float(self._model["rest_length"])
         contraction = contraction_of(contraction, length, rest)
-        pressure = plain("pressure", pressure, "Pa")
-        given = [pressure, contraction] if direction is None else [pressure, contraction, direction]
-        arrays = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in given))
+        given = {"pressure": plain("pressure", pressure, "Pa"), "contraction": contraction}
+        given |= {} if direction is None else {"direction": direction}
+        arrays = matched(**given)
         flat = [np.ascontiguousarray(array.ravel()) for array in arrays]
         doubt_pascals("pressure", flat[0], inside=2)
         force = function(flat[0], flat[1], flat[2] if len(flat) > 2 else None)

@@ -313,7 +313,7 @@ class _Connector:
                     # its pressure would have no rate
                     if kind_of("line", table) == "orifice" and table.get("inlet_volume") == 0.0:
                         self.note(
-                            f"{label}.inlet_volume = 0 m3 is not allowed: more is needed between "
+                            f"{label}.inlet_volume = 0 is not allowed: more is needed between "
                             "an orifice and the valves that feed it"
                         )
                     continue
@@ -324,13 +324,13 @@ class _Connector:
             self.two_ends("line", name, start, end)
             if start is not None and table.get("inlet_volume"):
                 self.note(
-                    f"{label}.inlet_volume = {table['inlet_volume']:g} m3 is not allowed: {label} "
-                    f"begins at {start}, and only an inlet that valves feed has a volume of its own"
+                    f"{label}.inlet_volume is not allowed: {label} begins at {start}, and only an "
+                    "inlet that valves feed has a volume of its own"
                 )
             if start is not None and table.get("pressure_zero"):
                 self.note(
-                    f"{label}.pressure_zero = {table['pressure_zero']:g} Pa is not allowed: "
-                    f"{label} begins at {start}, and only an inlet that valves feed has a gauge"
+                    f"{label}.pressure_zero is not allowed: {label} begins at {start}, and only an "
+                    "inlet that valves feed has a gauge"
                 )
 
     def two_ends(self, block: str, name: str, start: str | None, end: str | None) -> None:

@@ -10,13 +10,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from pamrs._checks import as_said
+from pamrs._checks import angle_meant, as_said
 from pamrs._files import MOST_NAME, parse_toml, shown
 from pamrs.declared import unknown_key
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.rig._checks import block_problems
 from pamrs.rig._model_error import read_model_error
 from pamrs.rig._ports import bare, connect, near_name
+from pamrs.rig._units import Units
 from pamrs.rig.muscle_models import own_geometry
 from pamrs.rig.schema import (
     BLOCKS,
@@ -33,7 +34,7 @@ from pamrs.rig.schema import (
     qualified,
     tables_of,
 )
-from pamrs.units import to_si, with_unit
+from pamrs.units import from_si, to_si, with_unit
 
 _TOP = ("schema", "name", "description", "case", "limits", "effects", "model_error")
 _QUANTITY = ("value", "unit", "tol", "unknown", "error")
@@ -49,6 +50,7 @@ class Content:
     model: dict[str, Any]
     tolerances: dict[str, float] = field(default_factory=dict)
     effect_std: dict[str, dict[str, float]] = field(default_factory=dict)
+    units: Units = field(default_factory=Units)
 
     def leaves_open(self, dotted: str) -> bool:
         """Whether a parameter has another value in each recording: ``error = "own"``."""
@@ -97,6 +99,7 @@ class Reader:
         self.problems: list[str] = []
         self.tolerances: dict[str, float] = {}
         self.effect_std: dict[str, dict[str, float]] = {}
+        self.units = Units()
         self.ports: dict[str, dict[str, str]] = {}
         self.own: list[str] = []
         self.whole = True  # every block could be told: what is connected to what can be checked
@@ -144,8 +147,8 @@ class Reader:
             ports, problems = connect(model)
             self.problems += problems
             self.gauges(model, ports, document)
-        self.problems += block_problems(model)
-        return Content(name, model, self.tolerances, self.effect_std)
+        self.problems += block_problems(model, self.units)
+        return Content(name, model, self.tolerances, self.effect_std, self.units)
 
     def limits(self, raw: Any) -> dict[str, Any]:
         """What the bench allows, under ``limits``; nothing where the file says nothing."""
@@ -347,6 +350,7 @@ class Reader:
                     self.problem(f"{label}.{word} is not allowed: a count is known")
             return int(value)
         self.spread(f"{block}.{key.name}", label, key, unit, extra)
+        self.units.written.update({f"{block}.{key.name}": unit} if extra else {})
         return value
 
     def quantity(
@@ -404,10 +408,11 @@ class Reader:
         if not (math.isfinite(value) and lower <= value <= upper) or (
             whole and not value.is_integer()
         ):
-            given = "" if unit == si_unit else f" ({with_unit(f'{number:g}', unit)})"
-            allowed = with_unit(f"{what} from {lower:g} to {upper:g}", si_unit)
-            wrong = with_unit(f"{label} = {value:g}", si_unit)
-            self.problem(f"{wrong}{given} is not allowed: {allowed}")
+            low, high = (from_si(x, unit, si_unit, difference=difference) for x in (lower, upper))
+            allowed = with_unit(f"{what} from {low:g} to {high:g}", unit)
+            meant = angle_meant(label, value, lower, upper) if si_unit == "rad" else ""
+            wrong = with_unit(f"{label} = {number:g}", unit)
+            self.problem(f"{wrong} is not allowed: {allowed}{meant}")
             return None
         return value
 
@@ -547,15 +552,18 @@ class Reader:
         if "value" not in raw or not isinstance(unit, str):
             self.problem(f"{label}: value and unit (like {parameter.unit!r}) are needed")
             return None
+        full = qualified(identity, place)
         value = self.scalar(
             label, parameter.unit, raw["value"], unit, parameter.lower, parameter.upper
         )
+        if value is not None:
+            self.units.written[f"{full}.{parameter.name}"] = unit
         if "std" in raw:
             std = self.scalar(
                 f"{label}.std", parameter.unit, raw["std"], unit, 0.0, 1e300, difference=True
             )
             if std is not None:
-                self.effect_std.setdefault(qualified(identity, place), {})[parameter.name] = std
+                self.effect_std.setdefault(full, {})[parameter.name] = std
         return value
 
 

@@ -18,7 +18,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pamrs._checks import checked_number, checked_table, one_of
+from pamrs._checks import checked_number, checked_table, doubt, one_of, plain, positive, refused
 from pamrs._files import read_toml
 from pamrs._views import Panels, View
 from pamrs._writing import write_atomically
@@ -35,6 +35,7 @@ from pamrs.rig._switching import (
     placed,
     without,
 )
+from pamrs.rig._units import Units
 from pamrs.rig._writer import core_json, toml_text
 from pamrs.rig.schema import BLOCKS, Key, keys_of, qualified, split_name, tables_of
 
@@ -77,6 +78,7 @@ class Parameter:
     known: bool = True
 
 
+_DAY: Final = 86400.0  # [s]
 _COMPARED: Final = ("name", "_model", "_tolerances", "_effect_std")
 """What rigs that are equal have alike; where they were read from, and comments, may differ."""
 
@@ -91,6 +93,8 @@ class Rig(View):
         The rig's name.
     source : str
         Where it was read from, for messages.
+    units : Units
+        The units that its file has, for what is said of its values.
 
     Examples
     --------
@@ -109,6 +113,7 @@ class Rig(View):
     _effect_std: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
     source: str = field(default="", repr=False)
     _text: str = field(default="", repr=False)  # the file, as its author wrote it
+    units: Units = field(default_factory=Units, repr=False)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Rig):
@@ -195,11 +200,14 @@ class Rig(View):
     def _numbers(self) -> dict[str, str]:
         told = {"rig": self.name, "blocks": ", ".join(self.blocks)}
         for name, table in self.tables("muscle").items():
-            size = f"{1e3 * table['rest_length']:.4g} x {1e3 * table['rest_diameter']:.4g} mm"
-            told[qualified("muscle", name)] = f"{table['model']}, {size}, {table['count']} of them"
+            full = qualified("muscle", name)
+            ends = ((key, table[key]) for key in ("rest_length", "rest_diameter"))
+            size = " x ".join(self.units.said(f"{full}.{key}", "m", end) for key, end in ends)
+            told[full] = f"{table['model']}, {size}, {table['count']} of them"
         for name, table in self.tables("supply").items():
-            bar = f"{table['initial_pressure'] / 1e5:.4g} bar"
-            told[qualified("supply", name)] = f"{table['kind']}, {bar}"
+            full = qualified("supply", name)
+            begun = self.units.said(f"{full}.initial_pressure", "Pa", table["initial_pressure"])
+            told[full] = f"{table['kind']}, {begun}"
         told |= {"effects": ", ".join(full_name(e) for e in self.effects)} if self.effects else {}
         return told | {"cautions": "; ".join(self.cautions) or "none"}
 
@@ -211,7 +219,7 @@ class Rig(View):
         that are too long or short for their joint, or whose largest pressure nobody says, friction
         of exactly nothing, measured values without a tolerance. Empty where nothing is.
         """
-        return cautions_of(self._model, self._connected, self._known, self._text)
+        return cautions_of(self._model, self._connected, self._known, self.units, self._text)
 
     @cached_property
     def _connected(self) -> Ports:
@@ -585,7 +593,7 @@ class Rig(View):
         -------
         str
         """
-        content = Content(self.name, self._model, self._tolerances, self._effect_std)
+        content = Content(self.name, self._model, self._tolerances, self._effect_std, self.units)
         if not comments or not self._text:
             return toml_text(content)
         from pamrs.rig._edited import edited_text
@@ -680,7 +688,43 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
 def parse_rig(text: str, *, source: str = "rig") -> Rig:
     """Read a rig from TOML text; ``source`` names it in messages. See :func:`load_rig`."""
     content = read_model(text, source)
-    return Rig(content.name, content.model, content.tolerances, content.effect_std, source, text)
+    known = content.tolerances, content.effect_std
+    return Rig(content.name, content.model, *known, source, text, content.units)
+
+
+def check_sample_time(rig: Rig, sample_time: Any, *, inside: int = 1) -> float:
+    """A sample time of recordings or runs of a rig [s].
+
+    Parameters
+    ----------
+    rig : Rig
+        The rig.
+    sample_time : object
+        What was given.
+    inside : int, optional
+        How many functions inside the one that a user calls asks.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ParameterError
+        If it is not a finite number above zero, a day at most.
+
+    Warns
+    -----
+    UnitWarning
+        If it is a second or longer, which nothing follows that a valve or a muscle moves.
+    """
+    seconds = positive("sample_time", plain("sample_time", sample_time, "s"))
+    if seconds > _DAY:
+        raise refused("sample_time", sample_time, f"at most a day is, {_DAY:g} s")
+    if seconds >= 1.0 and any(map(rig.tables, ("valve", "joint", "load"))):
+        said = f"sample_time = {seconds:g} s: are milliseconds meant? Seconds are wanted, "
+        doubt(f"{said}{seconds:g} ms is {1e-3 * seconds:g}", inside=inside + 1)
+    return seconds
 
 
 def payload_of(rig: Rig) -> str:

@@ -187,3 +187,7 @@ def __getattr__(name: str) -> Callable[[], Rig]:
             f"module {__name__!r} has no attribute {name!r}; {meant(name, names())}"
         )
     return functools.partial(named, name)
+
+
+def __dir__() -> list[str]:
+    return names()

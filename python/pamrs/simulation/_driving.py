@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import by_hand, doubt_pascals, one_of, refused
+from pamrs._checks import as_numbers, by_hand, doubt_pascals, misshapen, one_of, refused
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.errors import ParameterError, meant
 from pamrs.simulation._plants import rowwise
@@ -79,7 +79,7 @@ def signals_of(
     """
     inputs = inputs_of(rig)
     given = inputs.named(asked)
-    sizes = {name: np.size(values) for name, values in given.items() if np.ndim(values) > 0}
+    sizes = {name: max(np.shape(values)) for name, values in given.items() if np.ndim(values) > 0}
     count = rows if rows is not None else (next(iter(sizes.values())) if sizes else None)
     signals = {}
     for name, values in given.items():
@@ -386,10 +386,7 @@ def _signal(
     name: str, values: ArrayLike, rows: int | None, allowed_range: tuple[float, float, str]
 ) -> Array:
     """One signal as a checked array; a number stays the same in every row."""
-    try:
-        signal = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} is not allowed: numbers are needed") from None
+    signal = as_numbers(name, values)
     if signal.ndim == 0 and rows is not None:
         signal = np.full(rows, float(signal))
     if signal.ndim == 0:
@@ -398,10 +395,7 @@ def _signal(
             "(or give one value for each row)"
         )
     if signal.ndim != 1 or signal.size == 0 or (rows is not None and signal.size != rows):
-        needed = "(n,) with n >= 1" if rows is None else f"({rows},)"
-        raise ParameterError(
-            f"{name} has the shape {signal.shape}; {needed} is needed, one value for each row"
-        )
+        raise misshapen(name, signal.shape, rows, "one value for each row")
     low, high, allowed = allowed_range
     least, most = float(signal.min()), float(signal.max())
     if not (low <= least and most <= high and math.isfinite(least) and math.isfinite(most)):

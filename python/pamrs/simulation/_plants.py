@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import as_numbers, as_said, refused, whole
+from pamrs._checks import as_numbers, as_said, misshapen, refused, whole
 from pamrs.errors import ParameterError
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ _MOST_PLANTS = 10_000_000
 
 def plants_of(n: int | None, rigs: int | None, given: Mapping[str, ArrayLike]) -> int:
     """Number of plants from what says it: a number, a sequence of rigs, arrays by their name."""
-    sizes = {name: int(np.size(values)) for name, values in given.items() if np.ndim(values)}
+    sizes = {name: int(max(np.shape(v))) for name, v in given.items() if np.ndim(v)}
     if n is not None:
         sizes = {"n": whole("n", n, 1), **sizes}
     if rigs is not None:
@@ -48,9 +48,7 @@ def rowwise(name: str, values: ArrayLike, n: int, *, finite: bool = True) -> Arr
     if array.ndim == 0:
         array = np.full(n, float(array))
     if array.shape != (n,):
-        raise ParameterError(
-            f"{name} has the shape {array.shape}; ({n},) is needed, one value for each plant"
-        )
+        raise misshapen(name, array.shape, n, "one value for each plant")
     for row in np.flatnonzero(~np.isfinite(array))[:1] if finite else ():
         raise refused(f"{name}[{row}]", array[row], "a finite number is needed")
     return np.ascontiguousarray(array)

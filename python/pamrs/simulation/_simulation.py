@@ -18,7 +18,7 @@ from pamrs._tables import over_time as columns_over_time
 from pamrs._views import Panels, View, in_laboratory_units, over_time
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
-from pamrs.rig import Rig
+from pamrs.rig import Rig, check_sample_time
 from pamrs.simulation._driving import (
     Signals,
     by_signal,
@@ -462,9 +462,14 @@ def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
     """
     cached: Any = rig.__dict__.get("_compiled")
     if cached is None:
-        cached = _revalued(rig, like)
-        if cached is None:
-            cached = _core.Rig(rig.to_json()) if like is None else like.respecified(rig.to_json())
+        try:
+            cached = _revalued(rig, like)
+            if cached is None:
+                text = rig.to_json()
+                cached = _core.Rig(text) if like is None else like.respecified(text)
+        except ParameterError as error:
+            known = {name: own.unit for name, own in rig.parameters.items()}
+            raise ParameterError(rig.units.retold(str(error), known)) from None
         object.__setattr__(rig, "_compiled", cached)
     compiled: _core.Rig = cached
     return compiled
@@ -598,9 +603,11 @@ def names_of(argument: str, names: Iterable[str]) -> list[str]:
 
 
 def check_run(rig: Rig, sample_time: float) -> None:
-    """Refuse what is not a rig and a sample time [s] that is not a finite number above zero."""
+    """Refuse what is not a rig, and a sample time [s] that none can have, for a public function
+    that takes quantities.
+    """
     check_kind("rig", rig, Rig, "a Rig (pamrs.rigs.shoulder(), pamrs.load_rig(path))")
-    positive("sample_time", sample_time)
+    check_sample_time(rig, sample_time, inside=3)
 
 
 def check_rows(channels: int, rows: int) -> None:
@@ -620,7 +627,8 @@ def whole_samples(name: str, value: float, sample_time: float, least: int) -> in
         if isinstance(value, (int, float, np.number)) and np.isfinite(value)
         else -1
     )
-    if count < least or abs(count * sample_time - value) > 1e-6 * sample_time:
+    near = abs(count * sample_time - value) <= 1e-6 * sample_time
+    if not (least <= count <= MOST_NUMBERS and near):
         raise ParameterError(
             f"{name} = {value} s is not allowed: a multiple of sample_time = {sample_time} s, "
             f"{least} at least, is needed"

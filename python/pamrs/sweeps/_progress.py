@@ -10,7 +10,7 @@ from typing import Final, TextIO
 from pamrs._progress import LOG, Line, duration_words
 
 #: Seconds from one line to the next, on a terminal and elsewhere.
-_TERMINAL, _FILE = 0.5, 15.0
+_TERMINAL, _FILE = 0.5, 10.0
 
 
 class Progress:

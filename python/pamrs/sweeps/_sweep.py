@@ -7,12 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import check_kind, quantities, refused, whole
+from pamrs._checks import as_numbers, check_kind, finite, misshapen, quantities, whole
 from pamrs.errors import ParameterError
-from pamrs.rig import Rig
+from pamrs.rig import Rig, check_sample_time
 from pamrs.sweeps._axes import INITIAL, Axes
 from pamrs.sweeps._drives import Drive, OpenLoop, metric_of, run_chunk
 from pamrs.sweeps._plan import Plan
@@ -129,11 +128,11 @@ def sweep(
     }
     drive = OpenLoop(
         {str(name): metric_of(name, given) for name, given in metrics.items()},
-        _number("sample_time", sample_time),
-        None if step is None else _number("step", step),
-        None if duration is None else _number("duration", duration),
+        check_sample_time(rig, sample_time, inside=2),
+        None if step is None else finite("step", step),
+        None if duration is None else finite("duration", duration),
         {name: _signal(name, given) for name, given in signals.items() if given is not None},
-        {name: _number(f"initial {name}", value) for name, value in (initial or {}).items()},
+        {name: finite(f"initial {name}", value) for name, value in (initial or {}).items()},
     )
     return run_plan(
         rig,
@@ -151,23 +150,10 @@ def sweep(
 def _signal(name: str, given: Any) -> Any:
     if isinstance(given, Mapping):
         return {key: _signal(f"{name}.{key}", values) for key, values in given.items()}
-    try:
-        signal = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} is not allowed: numbers are needed") from None
+    signal = as_numbers(name, given).copy()
     if signal.ndim > 1 or signal.size == 0:
-        raise ParameterError(
-            f"{name} has the shape {signal.shape}; (n,) with n >= 1 is needed, one value for each "
-            "sample, the same for all runs"
-        )
+        raise misshapen(name, signal.shape, each="one value for each sample, the same for all runs")
     return signal if signal.ndim else float(signal)
-
-
-def _number(name: str, given: Any) -> float:
-    try:
-        return float(given)
-    except (TypeError, ValueError):
-        raise refused(name, given, "a number is needed") from None
 
 
 def run_plan(

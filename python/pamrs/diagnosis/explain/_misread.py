@@ -55,7 +55,8 @@ def misread_diagnosis(
         gain=reading.gain,
         std=reading.std,
     )
-    text, advice = misread_sentence(entry), misread_advice(entry)
+    unit = fitted.recordings[0].recording.said.get(channels[0], "")
+    text, advice = misread_sentence(entry, unit), misread_advice(entry)
     return Diagnosis(
         case=case.name,
         verdict="units",

@@ -25,6 +25,7 @@ from pamrs.report.text import (
 )
 from pamrs.report.verdict import unknown_volumes
 from pamrs.rig.schema import split_name
+from pamrs.units import in_words
 
 _MOVED_TOLERANCES = 2.0  # [tolerances] movement of a parameter beside an effect from which it is
 # relative scatter of an effect's size between recordings from which it is reported
@@ -155,7 +156,8 @@ def warnings(
             largest = float(np.nanmax(np.abs(values[recording.mask[channel]])))
             if largest < _DOUBTED_PRESSURE:
                 out.append(
-                    f"{recording.name}: {channel} never exceeds {largest:.3g} Pa gauge, next to "
+                    f"{recording.name}: {channel} never exceeds "
+                    f"{in_words(recording.said.get(channel, ''), 'Pa', largest)} gauge, next to "
                     "nothing for a muscle or a tank: is the unit in its header the one its values "
                     "are in?"
                 )
@@ -205,16 +207,19 @@ def warnings(
 def absolute(case: Case) -> list[str]:
     """Muscle pressures that begin at one atmosphere in every recording: they may not be gauge."""
     ambient = float(case.rig.model["gas"]["ambient_pressure"])
-    firsts: dict[str, list[float]] = {}
+    firsts, said = dict[str, list[float]](), dict[str, str]()
     for recording in case.recordings:
         for channel, values in recording.channels.items():
             rows = recording.mask[channel]
             if channel_of(channel) == "muscle_pressure" and rows.any():
+                said[channel] = recording.said.get(channel, "")
                 firsts.setdefault(channel, []).append(float(values[rows][0]))
     return [
-        f"{channel} begins at {np.mean(begun):.4g} Pa in every recording, one atmosphere "
-        f"(gas.ambient_pressure = {ambient:g} Pa): are these absolute pressures? Gauge pressures "
-        "are needed; what is found below may be no more than the difference"
+        f"{channel} begins at {in_words(said[channel], 'Pa', float(np.mean(begun)))} in every "
+        "recording, one atmosphere (gas.ambient_pressure = "
+        f"{case.rig.units.said('gas.ambient_pressure', 'Pa', ambient, digits='.6g')}): are these "
+        "absolute pressures? Gauge pressures are needed; what is found below may be no more than "
+        "the difference"
         for channel, begun in firsts.items()
         if all(abs(first - ambient) < _AMBIENT_SHARE * ambient for first in begun)
     ]

@@ -283,7 +283,7 @@ def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
     terms = [term for hypothesis in left for term in hypothesis.terms]
     values = all(term.is_value for term in terms) and all(h.terms and not h.rest for h in left)
     if len(left) > 1 and values:
-        return NextExperiment(_measured(list(dict.fromkeys(terms))) + ".")
+        return NextExperiment(_measured(list(dict.fromkeys(terms)), asked.nominal) + ".")
     missed = [own.block for own in answer.missed if own.block in part.group.blocks]
     name = next(iter([*missed, part.block]))
     block = next((b for b in asked.blocks if b.name == name), asked.blocks[-1])
@@ -360,7 +360,8 @@ def _pair(
         if values:
             return PairExperiment(
                 labels,
-                f"{_measured(values)}; or, for the {spoken_name(block.name)}: {what}; {shows}.",
+                f"{_measured(values, asked.nominal)}; or, for the {spoken_name(block.name)}: "
+                f"{what}; {shows}.",
                 kind,
             )
         effect = next((term for term in differing if term.is_effect), None)
@@ -382,7 +383,7 @@ def _pair(
             f" (without {name} the model would miss the {spoken_name(channel)} by "
             f"{size:.2g} times the noise level)"
         )
-    text += f". {_measured(values)}." if values else "."
+    text += f". {_measured(values, asked.nominal)}." if values else "."
     return PairExperiment(labels, text, kind, None if missed is None else missed[1])
 
 
@@ -412,12 +413,16 @@ def _missed_without(
     return None
 
 
-def _measured(values: Sequence[Term]) -> str:
+def _measured(values: Sequence[Term], rig: Rig) -> str:
     """How values of the rig file are told from what looks like them."""
-    names = " or the ".join(spoken_name(term.id) for term in values)
+    ways, told = words("measured"), list[str]()
+    for term in values:
+        known = rig.parameters.get(term.id)
+        way = ways.get(term.id.rpartition(".")[2], ways.get(known.unit) if known else None)
+        told.append(spoken_name(term.id) + (f" ({way})" if way else ""))
     return (
-        f"Measure the {names} by itself (scale, ruler, known volume): these recordings cannot tell "
-        "which is wrong"
+        f"Measure the {' or the '.join(told)} by itself: these recordings cannot tell which is "
+        "wrong"
     )
 
 

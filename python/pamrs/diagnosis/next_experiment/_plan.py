@@ -7,9 +7,10 @@ import textwrap
 from dataclasses import dataclass, field
 from typing import Any
 
-from pamrs.channels import read_in
 from pamrs.effects import CATALOGUE, Term, find_parameter
 from pamrs.errors import ParameterError
+from pamrs.rig import Units
+from pamrs.units import from_si
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,8 @@ class Plan:
         The same, joined.
     additions : list of Addition
         What would add most, first.
+    units : Units
+        Units of the rig file, which sizes are given in.
     """
 
     rig: str
@@ -108,6 +111,7 @@ class Plan:
     pairs: list[tuple[str, str, float]]
     groups: list[tuple[str, ...]]
     additions: list[Addition] = field(default_factory=list)
+    units: Units = field(default_factory=Units)
 
     @property
     def seen(self) -> tuple[str, ...]:
@@ -272,10 +276,15 @@ class Plan:
             rivals = [
                 b if a == sight.effect else a for a, b, _ in self.pairs if sight.effect in (a, b)
             ]
-            unit, factor = read_in(find_parameter(sight.size).unit if sight.size else "")
-            typical = f"{factor * sight.typical:.3g}" if math.isfinite(sight.typical) else ""
+            si = find_parameter(sight.size).unit if sight.size else "1"
+            unit = self.units.usual(si)
+            typical, smallest = (
+                f"{from_si(size, unit, si, difference=True):.{digits}g}"
+                if math.isfinite(size)
+                else ""
+                for size, digits in ((sight.typical, 3), (sight.smallest, 2))
+            )
             unit = "" if unit == "1" else unit
-            smallest = f"{factor * sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
             where = f"{sight.block or '-':<{room}}{sight.recording or '-':<{long}}"
             if sight.verdict == "not seen":
                 rivals += [

@@ -14,7 +14,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._arrays import solve_normal
+from pamrs._progress import Steps
 from pamrs.diagnosis.fit import (
     FIT_BIN_TIME,
     Key,
@@ -124,6 +125,7 @@ def plan_diagnosis(
     noise: Mapping[str, float] | None = None,
     experiments: Sequence[str] | None = None,
     settings: DiagnosisSettings | None = None,
+    progress: Callable[[str], object] | None = None,
 ) -> Plan:
     """What a diagnosis could tell of a rig from some channels, before anything is recorded.
 
@@ -145,6 +147,8 @@ def plan_diagnosis(
         and steps by default, and slow strokes of a frame.
     settings : DiagnosisSettings, optional
         From where on an effect counts as seen, and two as apart; the published ones by default.
+    progress : callable, optional
+        Gets a line for each experiment; without one a notebook shows them.
 
     Returns
     -------
@@ -179,8 +183,9 @@ def plan_diagnosis(
     layers = _layers(rig, own, every)
     together = [block for _, blocks in layers for block in blocks]
     free = free_baseline(Problem(together, [], core_rig(rig), settings), rig)
-    usable = {}
-    for name, experiment in pool.items():
+    usable, tell = {}, Steps(progress)
+    for done, (name, experiment) in enumerate(pool.items()):
+        tell(name, done / len(pool))
         try:
             for measured, cut in layers:
                 heard = {c: v for c, v in sound.items() if c in measured}
@@ -212,6 +217,7 @@ def plan_diagnosis(
         pairs=pairs,
         groups=_joined([(a, b) for a, b, _ in pairs], order),
         additions=assumed.additions(own, every, chosen, usable),
+        units=rig.units,
     )
 
 

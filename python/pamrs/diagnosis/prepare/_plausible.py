@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs._arrays import stretches
-from pamrs.channels import block_of, channel_of, dotted, with_trait
+from pamrs.channels import block_of, channel_of, dotted, unit_of, with_trait
 from pamrs.diagnosis.prepare._blocks import Block, predicted
 from pamrs.diagnosis.prepare._signals import Prepared, moves_by_gauges
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -28,6 +28,7 @@ from pamrs.errors import DiagnosisError, SimulationError, joined
 from pamrs.findings import Faulty
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
+from pamrs.units import in_words
 
 # [Pa] gauge pressure that a channel exceeds somewhere: bar under a heading in Pa does not
 _LEAST_PEAK_PRESSURE = 100.0
@@ -197,8 +198,8 @@ def without_impossible(
                 where = recording.source or recording.name
                 said.append(
                     f"{recording.name}: {int(bad.sum())} samples of {name} in {where} are beyond "
-                    f"the possible ({low:.4g} to {high:.4g} {recording.units.get(name) or 'SI'}) "
-                    f"and were masked: {_when(bad, recording)}"
+                    f"the possible ({_told(recording, name, low, high)}) and were masked: "
+                    f"{_when(bad, recording)}"
                 )
         found.append(replace(recording, mask=mask, channels=channels))
     return found, said
@@ -245,6 +246,11 @@ def _when(bad: NDArray[np.bool_], recording: Recording) -> str:
     return ", ".join(told) + more
 
 
+def _told(recording: Recording, name: str, *values: float, digits: str = ".3g") -> str:
+    """Values of a channel in the unit that its log has."""
+    return in_words(recording.said.get(name, ""), unit_of(name), *values, digits=digits)
+
+
 def _values(recording: Recording, name: str) -> Array:
     """Usable samples of a channel; none where it was not measured."""
     if name not in recording.channels:
@@ -288,14 +294,15 @@ def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> I
         high = float(np.quantile(np.abs(values), 0.995))
         if 0.0 < high < _LEAST_PEAK_PRESSURE and np.ptp(values) > 0.0:
             yield (
-                f"{name} never exceeds {high:.3g} Pa gauge; a pressure of air exceeds "
-                f"{_LEAST_PEAK_PRESSURE:g} Pa somewhere: are its values in bar (or is it another "
-                "column, an angle or a voltage) under a heading in Pa?"
+                f"{name} never exceeds {_told(recording, name, high)} gauge; a pressure of air "
+                f"exceeds {_told(recording, name, _LEAST_PEAK_PRESSURE)} somewhere: are its values "
+                "in bar (or is it another column, an angle or a voltage) under a heading in Pa?"
             )
         elif high > top:
             yield (
-                f"{name} reaches {high:.3g} Pa gauge; at most {top:.3g} Pa is allowed: are its "
-                "values in Pa, kPa or psi under a heading in bar?"
+                f"{name} reaches {_told(recording, name, high)} gauge; at most "
+                f"{_told(recording, name, top)} is allowed: are its values in Pa, kPa or psi under "
+                "a heading in bar?"
             )
         elif name in rated:
             size, command = rated[name]
@@ -303,9 +310,10 @@ def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> I
             low_end = _SUPPLY_LEAST_SHARE * min(size, _in_front(recording, rig, block_of(name)))
             if size > 0.0 and not low_end <= high <= _SUPPLY_MOST_SHARE * size:
                 yield (
-                    f"{name} is at most {high:.3g} Pa and {source} {size:.3g} Pa; "
-                    f"{low_end:.3g} to {_SUPPLY_MOST_SHARE * size:.3g} Pa is allowed: right "
-                    "column and unit?"
+                    f"{name} is at most {_told(recording, name, high)} and {source} "
+                    f"{_told(recording, name, size)}; "
+                    f"{_told(recording, name, low_end, _SUPPLY_MOST_SHARE * size)} is allowed: "
+                    "right column and unit?"
                 )
 
 
@@ -360,8 +368,8 @@ def _frozen_tanks(recording: Recording, rig: Rig) -> Iterator[str]:
         ]
         if any(float(np.ptp(v)) > _FROZEN_TANK_CHANGE for v in moved):
             yield (
-                f"{name} has the one value {values[0]:.6g} Pa throughout although its tank is "
-                "drawn from: a frozen transducer; leave "
+                f"{name} has the one value {_told(recording, name, values[0], digits='.6g')} "
+                "throughout although its tank is drawn from: a frozen transducer; leave "
                 'the column out, or say [supply] kind = "constant" if it is one'
             )
 
@@ -403,12 +411,14 @@ def _order(recording: Recording, rig: Rig) -> Iterator[str]:
             above = recording.channels[name][rows] > allowed
             share = float(np.mean(above))
             if share > _ORDER_TIME_SHARE:
+                own, other = (
+                    _told(recording, name, float(np.median(own)))
+                    for own in (recording.channels[name][rows], limit)
+                )
                 yield (
-                    f"{name} is above {source} for {100 * share:.0f} % of the time (medians "
-                    f"{float(np.median(recording.channels[name][rows])):.3g} and "
-                    f"{float(np.median(limit)):.3g} Pa); at most "
-                    f"{100 * _ORDER_TIME_SHARE:.0f} % is allowed: are the two columns "
-                    "swapped, or one of their units wrong?"
+                    f"{name} is above {source} for {100 * share:.0f} % of the time (medians {own} "
+                    f"and {other}); at most {100 * _ORDER_TIME_SHARE:.0f} % is allowed: are the "
+                    "two columns swapped, or one of their units wrong?"
                 )
 
 
@@ -492,8 +502,9 @@ def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iter
             )
             yield (
                 f"{name} is outside {whose} for {100 * share:.0f} % of the time: from "
-                f"{values.min():.3g} to {values.max():.3g} {unit}, where {moving.low:.3g} to "
-                f"{moving.high:.3g} {unit} are possible: right column, unit ({units}) and sign?"
+                f"{_told(recording, name, values.min(), values.max())}, where "
+                f"{_told(recording, name, moving.low, moving.high)} are possible: right column, "
+                f"unit ({units}) and sign?"
             )
         rows = recording.mask[name]
         steps = (
@@ -502,10 +513,11 @@ def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iter
         fast = float(np.quantile(steps, 0.99)) if steps.size >= 16 else 0.0
         if fast > moving.fastest:
             yield (
-                f"{name} {'turns' if unit == 'rad' else 'moves'} with {fast:.3g} {unit}/s, one "
-                f"sample in a hundred faster; at most {moving.fastest:g} {unit}/s is allowed: are "
-                "the units of 'time' (s, ms, us) and of the "
-                f"{'angle' if unit == 'rad' else 'length'} those that their values are in?"
+                f"{name} {'turns' if unit == 'rad' else 'moves'} with "
+                f"{_told(recording, name, fast)}/s, one sample in a hundred faster; at most "
+                f"{_told(recording, name, moving.fastest)}/s is allowed: are the units of 'time' "
+                f"(s, ms, us) and of the {'angle' if unit == 'rad' else 'length'} those that their "
+                "values are in?"
             )
         pressures = [
             v for c in moving.pulled if (v := _values(recording, dotted("muscle_pressure", c))).size
@@ -524,9 +536,9 @@ def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iter
                 else "a frozen transducer and a load that is held"
             )
             yield (
-                f"{name} has the one value {values[0]:.4g} {unit} throughout while its muscles' "
-                f"pressures change: {what} cannot be told apart, and neither is in the model; "
-                "leave the recording out"
+                f"{name} has the one value {_told(recording, name, values[0], digits='.4g')} "
+                f"throughout while its muscles' pressures change: {what} cannot be told apart, "
+                "and neither is in the model; leave the recording out"
             )
 
 
@@ -548,11 +560,13 @@ def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
         opening = (recording.channels[name] - table["null_voltage"]) / table["half_range"]
         beyond = float(np.mean(np.abs(opening[both]) > _COMMAND_SPAN))
         if beyond > _COMMAND_TIME_SHARE:
+            middle = float(np.median(recording.channels[name][both]))
             yield (
                 f"{name} is beyond twice its valve's range for {100 * beyond:.0f} % of the time "
-                f"(median {float(np.median(recording.channels[name][both])):.3g} V); "
-                f"{table['null_voltage']:g} +- {table['half_range']:g} V is the range: right "
-                "column and unit?"
+                f"(median {_told(recording, name, middle)}); "
+                f"{_told(recording, name, table['null_voltage'])} +- "
+                f"{_told(recording, name, table['half_range'])} is the range: right column and "
+                "unit?"
             )
             continue
         if sum(e["to"] == ends["to"] for e in rig.ports("valve").values()) > 1:
@@ -631,10 +645,11 @@ def _dead(recording: Recording, rig: Rig) -> dict[str, str]:
         largest = float(np.nanmax(np.where(still, change, np.nan), initial=1.0))
         if largest > _DEAD_COMMAND_RATIO:
             found[command] = (
-                f"{command} has one value throughout ({values[0]:g} "
-                f"{recording.units.get(command) or 'SI'}) while {pressure} stands still and then "
-                f"changes {largest:.3g}-fold (absolute) within {_DEAD_COMMAND_TIME:g} s; "
-                f"at most {_DEAD_COMMAND_RATIO:g}-fold can be of one command"
+                f"{command} has one value throughout "
+                f"({_told(recording, command, values[0], digits='g')}) while {pressure} stands "
+                f"still and then changes {largest:.3g}-fold (absolute) within "
+                f"{_DEAD_COMMAND_TIME:g} s; at most {_DEAD_COMMAND_RATIO:g}-fold can be of one "
+                "command"
             )
     return found
 
@@ -748,9 +763,8 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         return None
     signals, name = prepared.signals, block.channel
     value, slope = signals[name]
-    shown = (
-        f"{name} goes from {measured.min():.3g} to {measured.max():.3g} rad, not as the model says"
-    )
+    span = _told(prepared.recording, name, measured.min(), measured.max())
+    shown = f"{name} goes from {span}, not as the model says"
     turned = float(np.median(measured + model))
     others: list[tuple[float, float, dict[str, tuple[Array, Array]], str]] = [
         (

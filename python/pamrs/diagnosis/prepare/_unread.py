@@ -102,7 +102,7 @@ def said_of_tanks(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepar
     for tank in dict.fromkeys(name for block in blocks for name in block.floating):
         name = begins_at(tank)
         own = [p.recording.parameters[name] for p in recordings if name in p.recording.parameters]
-        begun = f"{rig.parameter(name).value / 1e5:.3g} bar"
+        begun = rig.units.said(name, "Pa", rig.parameter(name).value)
         if own:
             begun = "the pressure that each recording has of its own"
         driven = " and ".join(block.name for block in blocks if tank in block.floating)
