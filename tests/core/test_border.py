@@ -10,7 +10,6 @@ import pytest
 
 import pamrs
 from pamrs.control import metrics, trajectories
-from pamrs.design import search
 from pamrs.errors import ParameterError
 
 SHOULDER, BENCH = pamrs.rigs.shoulder(), pamrs.rigs.bench()
@@ -47,7 +46,6 @@ ANY: dict[str, tuple[Callable[[Any], Any], Any]] = {
         np.full(10, 0.5),
     ),
     "force": (lambda a: MUSCLE.buckled(a), ROW),
-    "lower": (lambda a: search(np.sum, a, np.full(10, 99.0), method="random"), ROW),
 }
 
 
@@ -79,8 +77,3 @@ def test_shapes_that_do_not_go_together_are_told() -> None:
 def test_text_and_ragged_rows_are_no_numbers(text: Any) -> None:
     with pytest.raises(ParameterError, match="numbers are needed"):
         MUSCLE.force(text, 0.1)
-
-
-def test_a_function_that_gives_no_number_ends_a_search() -> None:
-    with pytest.raises(ParameterError, match="objective: its value at"):
-        search(lambda x: np.full(len(x), np.nan), [0.0], [1.0], method="random")

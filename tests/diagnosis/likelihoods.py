@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
@@ -14,6 +15,7 @@ from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.fit import Fit
 from pamrs.diagnosis.noise import Excess
 from pamrs.effects import Hypothesis
+from pamrs.rig import Parameter
 
 BINS = 600
 TIMES = 0.1 * np.arange(BINS)
@@ -53,6 +55,18 @@ def leaving(kept: Mapping[str, Excess]) -> Callable[[], Mapping[str, BlockLikeli
     return lambda: {block: of_ratio(found.ratio) for block, found in kept.items()}
 
 
+def stated(
+    values: Mapping[str, float], moved: Mapping[str, float], scales: Mapping[str, float]
+) -> dict[str, Parameter]:
+    """Parameters as a rig file states them, of values that moved by so many tolerances."""
+    return {
+        name: Parameter(
+            name, values[name] - far * scales[name], "1", scales[name], -math.inf, math.inf
+        )
+        for name, far in moved.items()
+    }
+
+
 def made_up(
     rig: pamrs.Rig,
     key: str,
@@ -73,5 +87,7 @@ def made_up(
         "scales": dict.fromkeys(known, 1.0),
         "freed": wrong,
     }
-    fit = Fit(effects, rig, known, cost=0.0, residuals={}, **usual | fitted)
+    given = usual | fitted
+    before = stated(known, given.get("moved", {}), given["scales"])
+    fit = Fit(effects, rig, known, cost=0.0, residuals={}, known=before, **given)
     return Candidate(effects, fit, left, left, 0.0, wrong=wrong, likelihood=leaving(left))

@@ -229,4 +229,4 @@ def test_a_refit_that_went_no_further_says_so() -> None:
     assert abs(found.moved["muscle.rest_length"]) < 0.1
     (told,) = problem.losses.told
     assert "the refit of the baseline stopped" in told
-    assert "load.min_length = 0.167" in told
+    assert "load.min_length = 16.7 cm" in told

@@ -172,8 +172,8 @@ def test_headline_badge_page_and_json_say_the_same(
 def test_it_is_settled_from_the_probability_that_the_settings_say() -> None:
     found = _judged("unlisted", {"unlisted": 0.7, "muscle_creep": 0.3})
     bold = dataclasses.replace(found, settings=pamrs.DiagnosisSettings(settled=0.65))
-    assert words.is_open(found)
-    assert not words.is_open(bold)
+    assert not found.answer.settled
+    assert bold.answer.settled
     assert "no effect of the catalogue explains (0.70)" in bold.headline
 
 

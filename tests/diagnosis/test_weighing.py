@@ -24,7 +24,7 @@ from pamrs.effects import EFFECTS, NONE, UNLISTED, Hypothesis, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
 from tests.diagnosis.asked import SETTINGS
-from tests.diagnosis.likelihoods import TIMES, made_up, rows_of
+from tests.diagnosis.likelihoods import TIMES, made_up, rows_of, stated
 from tests.diagnosis.terms import by_text, terms
 
 RIG = pamrs.rigs.shoulder()
@@ -191,12 +191,15 @@ def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
 
 def with_wrong(found: Candidate, *names: str) -> Candidate:
     """The same beside values that are 7 tolerances below those of the rig file."""
+    values, moved = dict.fromkeys(names, 0.72), dict.fromkeys(names, -7.0)
+    scales = dict.fromkeys(names, 0.04)
     fit = replace(
         found.fit,
-        values=found.fit.values | dict.fromkeys(names, 0.72),
-        moved=dict.fromkeys(names, -7.0),
+        values=found.fit.values | values,
+        moved=moved,
+        known=stated(values, moved, scales),
         freed=names,
-        scales=dict.fromkeys(found.fit.values, 1.0) | dict.fromkeys(names, 0.04),
+        scales=dict.fromkeys(found.fit.values, 1.0) | scales,
         covariance=np.diag([*np.diag(found.fit.covariance), *([1e-4] * len(names))]),
     )
     return replace(found, fit=fit, wrong=names)

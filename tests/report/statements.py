@@ -259,7 +259,9 @@ def _of_next(found: Diagnosis, page: str, summary: str) -> list[Statement]:
     told.append(Statement("the terminal has the next experiment", True, "next experiment"))
     block = str(own.excitation.get("block", ""))
     left = {m.block: words.left_in(found, m.block) for b in found.judged for m in b.mismatch}
-    if left.get(block) == "noise" and "more" in left.values():
+    part = found.answer.part_of(block)
+    asked = part is not None and len(part.left) > 1  # an open name is a question by itself
+    if left.get(block) == "noise" and "more" in left.values() and not asked:
         told.append(Statement("block that keeps more than noise", block, "next experiment"))
         told.append(Statement("block that keeps more than noise", left, "blocks"))
     return told

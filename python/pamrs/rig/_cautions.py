@@ -307,9 +307,9 @@ def _slack(model: Mapping[str, Any], ports: Ports, text: str, units: Units) -> l
             name = f"{label}.buckling_load"
             found.append(
                 f"{label} is slack without air, since {name} is not given, and its force model "
-                f"alone would push back by up to {units.said(name, 'N', push)}: a model that relies "
-                "on that lags where the muscle is slack; buckling_load says what it bears without air "
-                "(0 N: nothing)"
+                f"alone would push back by up to {units.said(name, 'N', push)}: a model that "
+                "relies on that lags where the muscle is slack; buckling_load says what it bears "
+                "without air (0 N: nothing)"
             )
     return found
 

@@ -18,9 +18,14 @@ use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
+/// Conductance of a fitting, a hose or a bladder that still holds pressure [m3/(s Pa)]: up to 24
+/// l/min at 3 bar; what lets out more is a way for air, and seen.
+const USUAL: (f64, f64) = (1e-16, 1e-9);
+
 const CONDUCTANCE: EffectParameter =
     EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-7, 5e-12)
         .starts(&[1e-11])
+        .usually(USUAL.0, USUAL.1)
         .off(0.0)
         .same_everywhere();
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from pamrs.diagnosis.evidence._candidates import Candidate, significant
-from pamrs.diagnosis.fit import Fit, Problem, form_in, same_data_in
+from pamrs.diagnosis.fit import Fit, Problem, form_in, moved_value, same_data_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -325,7 +325,9 @@ def value_may_be_inside(found: Fit, name: str, walls: float, stds: float) -> boo
     """Whether a fit has a value inside its tolerances (so many of them), or so many of its standard
     deviations outside.
     """
-    return abs(found.moved[name]) - walls < stds * found.std.get(name, 0.0) / found.scales[name]
+    wall = moved_value(found.known[name], math.copysign(walls, found.moved[name]))
+    beyond = math.copysign(1.0, found.moved[name]) * (found.values[name] - wall)
+    return beyond < stds * found.std.get(name, 0.0)
 
 
 def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:

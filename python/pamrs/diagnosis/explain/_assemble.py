@@ -124,7 +124,7 @@ def assemble(
         probabilities={str(h): p for h, p in found.probabilities.items()},
         parameters=_parameters(nominal, known, owners),
         fit=FitErrors(found.errors["fit"], found.errors["held_out"], gap),
-        warnings=constants + begun,
+        warnings=constants,
         rig=models.final
         if verdict == "none"
         else with_std(models.final, nominal, models.chosen, models.owners),
@@ -146,7 +146,7 @@ def assemble(
         settings=fitted.settings,
     )
     told = _warnings(case, models, found.table, diagnosis.parameters, same=held is fitted)
-    diagnosis = replace(diagnosis, warnings=[*constants, *told])
+    diagnosis = replace(diagnosis, warnings=[*constants, *told, *begun])
     picture = _picture(diagnosis.answer.block, found, fitted)
     where = words.where(diagnosis.answer, fitted, judged, picture, found.errors)
     return _worded(replace(answered(diagnosis), where=where), case, judged, forms)

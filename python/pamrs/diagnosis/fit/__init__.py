@@ -10,7 +10,8 @@ and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
 `depends`, `fits`, `places_of`, `same_data_in` (where effects act); `holdable`,
 `without_passing`, `known_parameters`, `with_known` (effects that the nominal model holds, and what
-is known of all parameters); `ends_in_tolerances` (how far they may move); `spread_over_pieces`
+is known of all parameters); `ends_in_tolerances`,
+`moved_value` (how far they may move); `spread_over_pieces`
 (standard deviations of coloured residuals).
 """
 
@@ -64,7 +65,7 @@ from pamrs.diagnosis.fit._starts import (
     with_entry,
     without_term,
 )
-from pamrs.diagnosis.fit._tolerances import ends_in_tolerances
+from pamrs.diagnosis.fit._tolerances import ends_in_tolerances, moved_value
 from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
 
 __all__ = [
@@ -98,6 +99,7 @@ __all__ = [
     "known_parameters",
     "levenberg_marquardt",
     "look_for_events",
+    "moved_value",
     "places_of",
     "predicted_with_doubt",
     "residuals",

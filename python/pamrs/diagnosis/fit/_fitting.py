@@ -202,6 +202,8 @@ class Fit:
         Variance of each block's binned residual relative to white noise, by which it was weighted.
     refused : SimulationError or None
         Why it could go no further, where one of the last steps left the range of the model.
+    known : mapping of str to Parameter
+        What was known of the baseline parameters before, by their names.
     """
 
     effects: tuple[Term, ...]
@@ -218,6 +220,7 @@ class Fit:
     freed: tuple[str, ...] = ()
     inflation: dict[str, float] = field(default_factory=dict)
     refused: SimulationError | None = None
+    known: Mapping[str, Parameter] = field(default_factory=dict)
 
     @property
     def held_by_prior(self) -> dict[str, float]:
@@ -721,4 +724,5 @@ def fit(
         loose,
         inflation,
         next(filter(None, refused[-_LAST_STEPS:]), None),
+        scaling.known,
     )

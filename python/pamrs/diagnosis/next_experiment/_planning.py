@@ -64,7 +64,7 @@ _SUSPECT_FROM = math.sqrt(0.45)
 # cosine of two signatures from which their effects are one (isolability as in Ding (2013))
 _SAME_COSINE = 0.95
 # [noise levels] what must be left of an effect when another one explains all that it can
-_APART = 1.0
+_TOLD_APART = 1.0
 _MOST_MULTIPLE = 1e4  # [typical sizes] largest size of an effect that is worth telling
 # halvings of a size until a rig can have it: below a hundredth it is another effect
 _MOST_HALVINGS = 8
@@ -288,7 +288,7 @@ class _Assumed:
                 sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2)),
             )
             seen = min(sights[first].left, sights[second].left) >= self.settings.seen
-            alike = cosine[first, second] > _SAME_COSINE or left < _APART
+            alike = cosine[first, second] > _SAME_COSINE or left < _TOLD_APART
             if seen and alike:
                 unseparated.add((first, second))
         chosen = [best[e] for e in effects]

@@ -17,7 +17,7 @@ from pamrs.simulation import core_rig
 
 _STRUT = 1e9  # [N] buckling load of a muscle that pushes back as its force model says
 _APART_NOISES = 3.0  # noise levels by which a push shows
-_LEAST_SHARE = 0.01  # of the samples of a recording in which it has to
+_LEAST_SLACK_SHARE = 0.01  # of the samples of a recording in which it has to
 _BETTER = 0.5  # share of what is missed there that is left with a push, where the lag is of that
 
 
@@ -76,7 +76,7 @@ def _lag(
     rows &= np.abs(pushing - slack) > _APART_NOISES * prepared.noise[block.channel]
     measured = prepared.recording.channels[block.channel][rows]
     lag, left = measured - slack[rows], measured - pushing[rows]
-    rare = rows.sum() < _LEAST_SHARE * prepared.n
+    rare = rows.sum() < _LEAST_SLACK_SHARE * prepared.n
     if rare or np.linalg.norm(left) > _BETTER * np.linalg.norm(lag):
         return 0.0, 0.0
     return float(np.abs(lag).max()), float(np.abs(left).max())

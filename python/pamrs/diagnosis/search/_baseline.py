@@ -28,7 +28,7 @@ from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-_MOST_WEIGHTINGS = 8  # of a refit beside recordings that count by their own
+_MOST_OWN_WEIGHTINGS = 8  # of a refit beside recordings that count by their own
 _LEAST_OTHERS = 2  # recordings that have to agree against one: a single one is fitted by anything
 _DRAGGED = 25.0  # times as large a sum of squares of the others beside one recording as without it
 
@@ -44,7 +44,7 @@ def with_autocorrelation(
     if autocorrelation.largest <= CORRELATED_VARIANCE:
         return first, autocorrelation
     found = thorough(problem, nominal, autocorrelation, first)
-    for _ in range(_MOST_WEIGHTINGS if autocorrelation.apart else 0):
+    for _ in range(_MOST_OWN_WEIGHTINGS if autocorrelation.apart else 0):
         # what stands apart had moved the baseline, and that missed the others
         last, autocorrelation = autocorrelation, autocorrelation_of(problem, found, noise_level)
         found = thorough(problem, nominal, autocorrelation, found)
