@@ -28,6 +28,7 @@ from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.evidence import BlockGroup
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, Unfollowed, fits, with_offsets
+from pamrs.diagnosis.laws import is_better, promising_laws, under
 from pamrs.diagnosis.model import conclude
 from pamrs.diagnosis.next_experiment import next_to_record
 from pamrs.diagnosis.noise import noise_levels
@@ -270,7 +271,12 @@ def _answer(
     else:
         laid = part("the search for offsets of commands", lambda: _on_time(inner, outer, case.rig))
         inner, outer, moved = laid or (inner, outer, [])
-        diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
+        stated, judged, unjudged = _physics(case, inner, outer, unjudged, say)
+        what = "the look at other laws of the rig"
+        diagnosis = inner.losses.part(
+            what, lambda: _under_best_law(case, asked, inner, stated), stated
+        )
+        inner = judged
     # the first few are all that a terminal shows: first what may make the answer wrong
     warnings = [*inner.losses.told, *ready.suspected, *ready.told, *diagnosis.warnings]
     warnings += [*ready.masked, *begun, *moved]
@@ -344,6 +350,25 @@ def _physics(
         )
         diagnosis = replace(diagnosis, warnings=[told, *diagnosis.warnings])
     return diagnosis, inner, unjudged
+
+
+def _under_best_law(
+    case: Case, asked: tuple[Hypothesis, ...], inner: Problem, stated: Diagnosis
+) -> Diagnosis:
+    """The diagnosis under the laws that the recordings follow, where those of the rig file leave a
+    mismatch.
+    """
+
+    def problems(rig: Rig) -> tuple[Problem, Problem, list[Unjudged]]:
+        own, held, unjudged, _ = _problems(case.with_rig(rig), inner.settings, asked)
+        return *_on_time(own, held, rig)[:2], unjudged
+
+    best, quiet = stated, Steps(None, within=_JUDGED)
+    for choice in promising_laws(case.rig, inner, stated, lambda rig: problems(rig)[0]):
+        other, _, _ = _physics(case.with_rig(choice.rig), *problems(choice.rig), quiet)
+        if is_better(other, best):
+            best = under(choice, other, stated)
+    return best
 
 
 def _judged_only(

@@ -64,6 +64,10 @@ class Diagnosis(View, Findings):
     faulty : list of Faulty
         Channels that a sensor or logger spoiled, masked or left out, and said first: ``channel``,
         ``kind``, ``text``.
+    laws : list of OtherLaw
+        Laws that the recordings follow in the place of those of the rig file, and under which all
+        of the rest is judged: ``name``, ``stated``, ``other``, ``channel``, ``unit``, ``before``, ``after``,
+        ``noise``.
     where : Where
         ``block``, ``channel``, ``intervals`` (pairs in s), ``conditions`` (``name``, ``share`` of
         the excess and of the ``time``, ``mean``, ``text``), ``text``; optionally ``recording``, to

@@ -211,6 +211,7 @@ def answer_of(
     *,
     enough: float = SETTLED,
     form: bool = False,
+    other_law: bool = False,
 ) -> Answer:
     """The answer that findings come to.
 
@@ -230,6 +231,8 @@ def answer_of(
         Probability above which an answer is settled.
     form : bool
         Whether the final model has a form of what has no name.
+    other_law : bool
+        Whether it has another law than the rig file: then that file is wrong.
     """
     missed = [*_missed_by_blocks(groups, errors), *_missed_by_whole(groups, runs)]
     every = [_part(group, places, enough) for group in groups]
@@ -243,15 +246,16 @@ def answer_of(
     open_ = any(len(p.left) > 1 for p in parts)
     why = "missed" if missed else "sets" if open_ else "probability"
     settled = not missed and all(p.sure for p in parts)
+    verdicts = [*(p.group.verdict for p in every), *["parameters"] * other_law]
     return Answer(
-        verdict=case_verdict((p.group.verdict for p in every), missed=bool(missed)),
+        verdict=case_verdict(verdicts, missed=bool(missed)),
         settled=settled,
         why="" if settled else why,
         block=parts[0].block if parts else None,
         names=list(names),
         probability=chance,
         missed=missed,
-        model=_model(every, form=form),
+        model=_model(every, changed=form or other_law),
         parts=parts,
         quiet=quiet,
     )
@@ -327,9 +331,9 @@ def _missed_by_whole(groups: Sequence[BlockVerdict], runs: Sequence[FreeRun]) ->
     return sorted(worst.values(), key=lambda own: -own.beyond)
 
 
-def _model(parts: Sequence[Part], *, form: bool) -> str:
+def _model(parts: Sequence[Part], *, changed: bool) -> str:
     """Name of the final model."""
-    if form or any(p.names for p in parts):
+    if changed or any(p.names for p in parts):
         return MENDED
     return YOURS if all(p.group.verdict == "none" for p in parts) else REFITTED
 

@@ -406,6 +406,31 @@ class Faulty(Entry):
 
 
 @dataclass(frozen=True, eq=False)
+class OtherLaw(Entry):
+    """A law that the recordings follow in the place of that which the rig file chooses.
+
+    Attributes
+    ----------
+    name, stated, other : str
+        Key of the rig file, its choice, and the choice under which all of the rest is judged.
+    channel, unit : str
+        The channel that tells most, and its SI unit.
+    before, after, noise : float
+        Its error with values refitted inside their tolerances, under the choice of the file and
+        under the other one, and its noise, SI.
+    """
+
+    name: str
+    stated: str
+    other: str
+    channel: str
+    unit: str
+    before: float
+    after: float
+    noise: float
+
+
+@dataclass(frozen=True, eq=False)
 class WrongParameter(Entry):
     """A value of the rig file that is wrong; SI.
 

@@ -26,6 +26,7 @@ from pamrs.findings._entries import (
     FitErrors,
     FreeRun,
     Misread,
+    OtherLaw,
     ParameterFound,
     Unexplained,
     Where,
@@ -50,6 +51,8 @@ class Findings:
         Channels that are likely in another unit than the log says.
     faulty : list of Faulty
         Channels that a sensor or logger spoiled: masked or left out, and said first.
+    laws : list of OtherLaw
+        Laws that the recordings follow in the place of those of the rig file.
     where : Where
         Block, channel, intervals, conditions, and a sentence.
     effects : list of EffectFound
@@ -120,6 +123,7 @@ class Findings:
     verdict: str
     misread: list[Misread] = field(default_factory=list)
     faulty: list[Faulty] = field(default_factory=list)
+    laws: list[OtherLaw] = field(default_factory=list)
     where: Where = field(default_factory=Where)
     effects: list[EffectFound] = field(default_factory=list)
     ambiguity: list[list[str]] = field(default_factory=list)
@@ -179,6 +183,7 @@ class Findings:
             {w.name: w.block for w in self.wrong_parameters},
             enough=self.settled,
             form=any(kept.form for kept in self.unexplained),
+            other_law=bool(self.laws),
         )
 
     @property

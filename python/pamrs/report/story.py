@@ -52,7 +52,8 @@ def title(diagnosis: Findings) -> str:
     if diagnosis.answer.missed:
         return words.missed_sentence(diagnosis, 1)
     if not parts:
-        return _healthy(diagnosis)
+        wrong = [f"{law.name} is {law.other}, not {law.stated}" for law in diagnosis.laws]
+        return f"The rig file is wrong: {wrong[0]}" if wrong else _healthy(diagnosis)
     together = _together(parts, doubt=False)
     if together and len(together.split()) <= LONGEST:
         return together
@@ -74,7 +75,7 @@ def headline(diagnosis: Findings) -> str:
     diagnosis : Findings
         What was found.
     """
-    first = [entry.text for entry in diagnosis.faulty]
+    first = [*(entry.text for entry in diagnosis.faulty), *map(words.law_sentence, diagnosis.laws)]
     if diagnosis.misread:
         return ". ".join([*first, "; ".join(reading.text for reading in diagnosis.misread)])
     parts, missed = diagnosis.answer.parts, words.missed_sentence(diagnosis)

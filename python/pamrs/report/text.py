@@ -24,6 +24,7 @@ from pamrs.findings import (
     EffectFound,
     EffectParameterFound,
     Findings,
+    OtherLaw,
     PairExperiment,
     Part,
     Unexplained,
@@ -388,6 +389,15 @@ def _shared(one: str, other: str) -> int:
 def searched(part: Part) -> bool:
     """Whether anything with a name was tried for what a group of blocks misses."""
     return any(key not in (*HEALTHY, "unlisted") for key in part.group.probabilities)
+
+
+def law_sentence(law: OtherLaw) -> str:
+    """A law that the recordings follow in the place of that of the rig file, in words."""
+    before, after = (sized(size, law.unit) for size in (law.before, law.after))
+    return (
+        f"With {law.name} = {law.other}, not {law.stated} as in the rig file, the refitted model "
+        f"misses {spoken_name(law.channel)} by {after} in the place of {before}"
+    )
 
 
 def missed_sentence(diagnosis: Findings, most: int | None = None) -> str:

@@ -10,6 +10,7 @@ rig.
 from __future__ import annotations
 
 from pamrs.rig._checks import muscle_problems
+from pamrs.rig._choices import OtherChoice, other_choices
 from pamrs.rig._joint import Joint
 from pamrs.rig._law import force_table
 from pamrs.rig._muscle import Muscle
@@ -28,6 +29,7 @@ from pamrs.rig._units import Units
 __all__ = [
     "Joint",
     "Muscle",
+    "OtherChoice",
     "Parameter",
     "Reader",
     "Rig",
@@ -39,6 +41,7 @@ __all__ = [
     "load_rig",
     "muscle_problems",
     "named_entries",
+    "other_choices",
     "parse_rig",
     "payload_of",
 ]

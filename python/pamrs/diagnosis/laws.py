@@ -1,0 +1,142 @@
+"""Other laws of a rig file as hypotheses: gas, valve flow and muscle force, tried in the blocks
+that miss.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from pamrs.diagnosis.evidence import without_autocorrelation
+from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.result import Diagnosis
+from pamrs.diagnosis.search import refitted
+from pamrs.findings import ChannelError, FreeRun, OtherLaw, Trace
+from pamrs.rig import OtherChoice, Rig, other_choices
+
+_BETTER = 0.5  # share of a squared error that another law leaves, from which it is looked at
+_NO_WORSE = 1.1  # ratio of two errors that count as equal
+
+
+def promising_laws(
+    rig: Rig, problem: Problem, found: Diagnosis, prepared: Callable[[Rig], Problem]
+) -> Iterator[OtherChoice]:
+    """Other laws whose baseline misses a suspect block by clearly less than that of the rig file.
+
+    Parameters
+    ----------
+    rig : Rig
+        The rig file's model.
+    problem : Problem
+        Recordings to fit.
+    found : Diagnosis
+        Their diagnosis under the laws of the rig file.
+    prepared : callable
+        The recordings to fit under another rig.
+    """
+    suspects = {part.block for part in found.answer.parts}
+    for mechanical in (False, True):
+        own = [b for b in problem.blocks if b.mechanical == mechanical]
+        if not any(b.name in suspects for b in own):
+            continue
+        names = [b.name for b in own]
+        stated = _missed(rig, problem, names)
+        for choice in other_choices(rig, ("muscle",) if mechanical else ("chamber", "valve")):
+            if _missed(choice.rig, prepared(choice.rig), names) < _BETTER * stated:
+                yield choice
+
+
+def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:
+    """Sum of squares that some blocks leave, refitted inside their tolerances; infinite where one
+    is not there.
+    """
+    blocks = [b for b in problem.blocks if b.name in names]
+    if len(blocks) < len(names):
+        return math.inf
+    own = replace(problem, blocks=blocks)
+    return 2.0 * refitted(own, rig, without_autocorrelation(blocks)).cost
+
+
+def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
+    """Whether an answer under another law leaves clearly less of the channels that the answer under
+    the stated law misses, or no more of them with fewer names.
+    """
+    channels = _channels(stated)
+    own, before = (_noises(d.proven, channels) for d in (other, stated))
+    fewer = len(other.answer.named) < len(stated.answer.named)
+    doubtful = not stated.answer.named and stated.answer.parts and not other.answer.parts
+    return own**2 < _BETTER * before**2 or (bool(fewer or doubtful) and own < _NO_WORSE * before)
+
+
+def _channels(found: Diagnosis) -> list[str]:
+    """Channels of the groups of blocks in which something is or may be missing or wrong."""
+    return [m.channel for part in found.answer.parts for m in part.group.mismatch]
+
+
+def _noises(errors: Mapping[str, ChannelError], channels: Sequence[str]) -> float:
+    """Root mean square error of some channels under a final model [noise levels], at least 1."""
+    left = [errors[c].after / errors[c].noise for c in channels if c in errors]
+    return max(1.0, math.sqrt(math.fsum(x * x for x in left) / max(1, len(left))))
+
+
+def under(choice: OtherChoice, other: Diagnosis, stated: Diagnosis) -> Diagnosis:
+    """A diagnosis under another law, which says so and keeps what the model of the rig file misses
+    as that of the user.
+    """
+    own, before = other.proven, stated.proven
+    both = [
+        (m.channel, m.unit)
+        for part in stated.answer.parts
+        for m in part.group.mismatch
+        if m.channel in own and m.channel in before
+    ]
+    channel, unit = max(both, key=lambda one: before[one[0]].refit / before[one[0]].noise)
+    sizes = before[channel].refit, own[channel].refit, own[channel].noise
+    law = OtherLaw(choice.name, choice.stated, choice.other, channel, unit, *sizes)
+    fit = replace(
+        other.fit,
+        channels=_with_before(other.fit.channels, stated.fit.channels),
+        held_out=_with_before(other.fit.held_out, stated.fit.held_out),
+    )
+    runs = None if other.free_run is None else _runs(other.free_run, stated.free_run or [])
+    return replace(
+        other,
+        laws=[law],
+        fit=fit,
+        traces=_traces(other.traces, stated.traces),
+        free_run=runs,
+        free_traces=_traces(other.free_traces, stated.free_traces),
+    )
+
+
+def _with_before(
+    errors: Mapping[str, ChannelError], stated: Mapping[str, ChannelError]
+) -> dict[str, ChannelError]:
+    """Errors whose first column is that of the user's model."""
+    return {
+        c: replace(error, before=stated[c].before) if c in stated else error
+        for c, error in errors.items()
+    }
+
+
+def _traces(traces: Sequence[Trace], stated: Sequence[Trace]) -> list[Trace]:
+    """Channels whose first simulation is that of the user's model."""
+    shown = {(t.recording, t.channel, t.time.shape): t.before for t in stated}
+    return [
+        replace(t, before=shown.get((t.recording, t.channel, t.time.shape), t.before))
+        for t in traces
+    ]
+
+
+def _runs(runs: Sequence[FreeRun], stated: Sequence[FreeRun]) -> list[FreeRun]:
+    """Free runs whose first column is that of the user's model."""
+    before = {(run.recording, c): e for run in stated for c, e in run.channels.items()}
+    found = []
+    for run in runs:
+        channels = dict(run.channels)
+        for c, error in run.channels.items():
+            own = before.get((run.recording, c), error)
+            channels[c] = replace(error, before=own.before, cut_before=own.cut_before)
+        found.append(replace(run, channels=channels))
+    return found

@@ -1,0 +1,115 @@
+"""Other choices of the laws of a rig: its gas, the flow of its valves, the force of its muscles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import tomlkit
+
+from pamrs.errors import ParameterError, RigError
+from pamrs.rig.schema import BLOCKS, of_kind, qualified
+
+if TYPE_CHECKING:
+    from pamrs.rig._rig import Rig
+
+_LAWS: Final = {"chamber": "gas", "valve": "flow", "muscle": "model"}
+"""Key of each kind of block that chooses its law."""
+_ORIFICE_RATIO: Final = 0.528
+"""Critical pressure ratio of an orifice."""
+_SONIC_CONDUCTANCE: Final = 1.992e-3
+"""Sonic conductance of a discharge area [m3/(s Pa) for each m2], of air at 20 degC (ISO 6358)."""
+
+
+@dataclass(frozen=True)
+class OtherChoice:
+    """A rig with another law of some of its blocks.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name of the key, ``chamber.gas``; of several blocks that all of them have.
+    stated, other : str
+        What the rig file chooses, and the other choice.
+    rig : Rig
+        The rig with it; what else it needs is at its usual value.
+    """
+
+    name: str
+    stated: str
+    other: str
+    rig: Rig
+
+
+def other_choices(rig: Rig, kinds: tuple[str, ...] = tuple(_LAWS)) -> Iterator[OtherChoice]:
+    """Every rig that differs from one in the law of all its chambers, valves or muscles, where the
+    file has what the other law needs.
+
+    Parameters
+    ----------
+    rig : Rig
+        The rig.
+    kinds : tuple of str, optional
+        ``chamber`` (its gas), ``valve`` (its flow), ``muscle`` (its force); all by default.
+    """
+    for kind in kinds:
+        key = next(key for key in BLOCKS[kind] if key.name == _LAWS[kind])
+        there = {str(table[key.name]) for table in rig.tables(kind).values()}
+        for other in key.choices if len(there) == 1 else ():
+            (stated,) = there
+            if other not in ("map", stated) and stated != "map":
+                try:
+                    changed = _with_law(rig, kind, key.name, other)
+                except (RigError, ParameterError):
+                    continue  # the file lacks what it needs
+                yield OtherChoice(f"{kind}.{key.name}", stated, other, changed)
+
+
+def _with_law(rig: Rig, kind: str, key: str, other: str) -> Rig:
+    """A rig whose blocks of a kind have another law."""
+    from pamrs.rig._rig import parse_rig
+
+    document: Any = tomlkit.parse(rig.to_toml_text())
+    for name in rig.tables(kind):
+        table = document[kind][name] if name else document[kind]
+        table[key] = other
+        for own in BLOCKS[kind]:
+            if own.name in table and not of_kind(kind, table, own):
+                table.update(_in_other_form(own.name, table))
+                del table[own.name]
+    changed = parse_rig(tomlkit.dumps(document))
+    names = {qualified(kind, name) for name in rig.tables(kind)}
+    if not names <= {qualified(kind, name) for name in changed.tables(kind)}:
+        raise RigError(f"rig {rig.name!r} loses blocks with another {key}")
+    return changed
+
+
+def _in_other_form(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    """What a key of one law of a valve's flow is in the other."""
+    if name == "discharge_area_max":
+        own, tol = _number(table[name], "m2")
+        sonic = {"value": own * _SONIC_CONDUCTANCE, "unit": "m3/(s Pa)"}
+        sonic["tol"] = tol * _SONIC_CONDUCTANCE
+        ratio = {"value": _ORIFICE_RATIO, "unit": "1"}
+        both = {f"{way}_conductance": sonic for way in ("fill", "vent")}
+        return both | {f"{way}_critical_ratio": ratio for way in ("fill", "vent")}
+    if name == "fill_conductance":
+        (fill, tol), (vent, _) = (
+            _number(table[f"{way}_conductance"], "m3/(s Pa)") for way in ("fill", "vent")
+        )
+        area = math.sqrt(fill * vent) / _SONIC_CONDUCTANCE
+        known = {"value": area, "unit": "m2", "tol": tol / fill * area}
+        return {"discharge_area_max": known}
+    return {}
+
+
+def _number(entry: Any, si: str) -> tuple[float, float]:
+    """Value and tolerance of an entry of a file [SI]."""
+    from pamrs.units import to_si
+
+    plain: dict[str, Any] = {"value": entry, "unit": si}
+    plain |= entry if isinstance(entry, Mapping) else {}
+    value, tol = (float(plain.get(key, 0.0)) for key in ("value", "tol"))
+    return to_si(value, plain["unit"], si), to_si(tol, plain["unit"], si)
