@@ -21,6 +21,8 @@ _ORIFICE_RATIO: Final = 0.528
 """Critical pressure ratio of an orifice."""
 _SONIC_CONDUCTANCE: Final = 1.992e-3
 """Sonic conductance of a discharge area [m3/(s Pa) for each m2], of air at 20 degC (ISO 6358)."""
+_USUAL_TOLERANCE: Final = 0.1
+"""Tolerance of a usual value that nobody stated, as a share of it."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,11 @@ def _with_law(rig: Rig, kind: str, key: str, other: str) -> Rig:
             if own.name in table and not of_kind(kind, table, own):
                 table.update(_in_other_form(own.name, table))
                 del table[own.name]
+        for own in BLOCKS[kind]:
+            usual = own.default if own.only and own.kind == "scalar" and not own.path else None
+            if own.name not in table and isinstance(usual, float) and of_kind(kind, table, own):
+                tol = _USUAL_TOLERANCE * abs(usual)
+                table[own.name] = {"value": usual, "unit": own.unit, "tol": tol}
     changed = parse_rig(tomlkit.dumps(document))
     names = {qualified(kind, name) for name in rig.tables(kind)}
     if not names <= {qualified(kind, name) for name in changed.tables(kind)}:
