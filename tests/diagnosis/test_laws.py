@@ -2,45 +2,54 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 import pamrs
-from pamrs.recordings import Recording
-from pamrs.rig import Rig, other_choices
-from tests.diagnosis.asked import diagnosed
+from pamrs.rig import other_choices
+from tests.diagnosis.healthy import RIGS, healthy_case
 
-BENCH = pamrs.rigs.bench()
-
-
-def test_every_packaged_rig_has_its_other_laws() -> None:
-    for name in pamrs.rigs.__all__:
-        rig = getattr(pamrs.rigs, name)()
-        for choice in other_choices(rig):
-            kind, key = choice.name.split(".")
-            tables = choice.rig.tables(kind).values()
-            assert {table[key] for table in tables} == {choice.other}
-            assert {table[key] for table in rig.tables(kind).values()} == {choice.stated}
-            assert choice.rig.parameters.keys() & rig.parameters.keys()
+SHOULDER = pamrs.rigs.shoulder()
 
 
-def with_gas(rig: Rig, law: str) -> Rig:
-    own = (c.rig for c in other_choices(rig, ("chamber",)) if c.other == law)
-    return next(own, rig)
+@pytest.mark.parametrize("name", RIGS)
+def test_every_packaged_rig_has_other_laws(name: str) -> None:
+    rig: pamrs.Rig = getattr(pamrs.rigs, name)()
+    choices = list(other_choices(rig))
+    assert {choice.name for choice in choices} >= {"chamber.gas", "muscle.model"}
+    for choice in choices:
+        kind, key = choice.name.split(".")
+        tables = choice.rig.tables(kind)
+        assert {table[key] for table in tables.values()} == {choice.other}
+        assert {table[key] for table in rig.tables(kind).values()} == {choice.stated}
+        assert tables.keys() == rig.tables(kind).keys()
 
 
-@pytest.mark.parametrize("law", ["energy_balance", "coefficients"])
-def test_the_other_gas_law_is_named(law: str) -> None:
-    """A chamber follows one law of its gas, and the rig file has the other."""
-    true = with_gas(BENCH, law)
-    stated = next(c.rig for c in other_choices(true, ("chamber",)))
-    rng = np.random.default_rng(5)
+def test_conductance_of_the_other_flow_law_is_that_of_the_area() -> None:
+    """An orifice and its sonic conductance let the same air through, there and back."""
+    (sonic,) = other_choices(SHOULDER, ("valve",))
+    (back,) = other_choices(sonic.rig, ("valve",))
+    name = "valve.discharge_area_max"
+    assert back.other == sonic.stated == "orifice"
+    stated, found = SHOULDER.parameters[name], back.rig.parameters[name]
+    assert (found.value, found.tol) == pytest.approx((stated.value, stated.tol))
 
-    def made(role: str, k: int) -> Recording:
-        return recorded(true, role, k, rng)
 
-    found = diagnosed(stated, made)
-    assert [(own.name, own.other) for own in found.laws] == [("chamber.gas", law)], found.summary()
-    assert found.answer.named == []
-    assert found.verdict == "parameters"
-    assert f"chamber.gas = {law}" in found.headline
+@pytest.mark.parametrize(
+    ("name", "other"), [("chamber.gas", "energy_balance"), ("muscle.model", "ferraresi")]
+)
+def test_the_law_that_the_recordings_follow_is_named(name: str, other: str) -> None:
+    """Nothing is missing but that the rig file has another law."""
+    choices = other_choices(SHOULDER, (name.split(".")[0],))
+    choice = next(c for c in choices if c.other == other)
+    case = healthy_case("shoulder", 1, 100, sharp=True).with_rig(choice.rig)
+    found = pamrs.diagnose(case)
+    assert [(law.name, law.stated, law.other) for law in found.laws] == [
+        (name, other, choice.stated)
+    ]
+    assert (found.verdict, found.answer.named) == ("parameters", []), found.summary()
+    assert f"{name} = {choice.stated}, not {other}" in found.headline
+    assert found.rig is not None
+    kind, key = name.split(".")
+    assert {table[key] for table in found.rig.tables(kind).values()} == {choice.stated}
+    before = found.fit.held_out[found.laws[0].channel].before
+    assert before > 5.0 * found.laws[0].after  # that of the user's own model

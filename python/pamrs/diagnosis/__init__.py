@@ -278,8 +278,8 @@ def _answer(
         )
         inner = judged
     # the first few are all that a terminal shows: first what may make the answer wrong
-    warnings = [*inner.losses.told, *ready.suspected, *ready.told, *diagnosis.warnings]
-    warnings += [*ready.masked, *begun, *moved]
+    warnings = [*inner.losses.told, *ready.suspected, *begun, *ready.told]
+    warnings += [*diagnosis.warnings, *ready.masked, *moved]
     found = _as_found(case, inner, outer)
     data = data_used(found, counts, inner.blocks, case.rig, inner.core, unjudged)
     return replace(diagnosis, warnings=warnings, data=data)

@@ -66,8 +66,8 @@ class Diagnosis(View, Findings):
         ``kind``, ``text``.
     laws : list of OtherLaw
         Laws that the recordings follow in the place of those of the rig file, and under which all
-        of the rest is judged: ``name``, ``stated``, ``other``, ``channel``, ``unit``, and errors of the
-        refitted baseline ``before`` and ``after``, beside the ``noise``.
+        of the rest is judged: ``name``, ``stated``, ``other``, ``channel``, ``unit``, and errors of
+        the refitted baseline ``before`` and ``after``, beside the ``noise``.
     where : Where
         ``block``, ``channel``, ``intervals`` (pairs in s), ``conditions`` (``name``, ``share`` of
         the excess and of the ``time``, ``mean``, ``text``), ``text``; optionally ``recording``, to
