@@ -64,6 +64,7 @@ def stated(
             name, values[name] - far * scales[name], "1", scales[name], -math.inf, math.inf
         )
         for name, far in moved.items()
+        if name in values
     }
 
 

@@ -172,6 +172,11 @@ def test_healthy_groups() -> None:
     judged, verdict = said(gas, arm)
     assert verdict == "parameters"
     assert left_open(judged[0].ambiguity) == at_wall
+    # each inside its tolerances, and all together unlikely
+    several = {f"arm.{k}": 2.2 for k in range(5)}
+    assert left_open(said(group("arm", {"": 1.0}, moved=several))[0][0].ambiguity) == at_wall
+    fewer = dict.fromkeys(list(several)[:1], 2.2)
+    assert not said(group("arm", {"": 1.0}, moved=fewer, shifted=True))[0][0].ambiguity
     judged, _ = said(gas, group("arm", {"": 1.0}, moved={"arm.payload": 3.0}))
     assert case_ambiguity(judged) == at_wall
     # what is open in a block keeps that it may have no name

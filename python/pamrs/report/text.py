@@ -207,6 +207,17 @@ def undetermined(effect: EffectFound) -> list[str]:
     ]
 
 
+def choice_words(effect: EffectFound, name: str) -> str:
+    """What the value of a choice stands for, ``the gauge is at the valve``; empty for a number."""
+    info = EFFECTS.get(effect.id)
+    form = info.form(effect.form) if info else None
+    own = next((p for p in form.parameters if p.name == name), None) if form else None
+    if own is None or own.role != "choice":
+        return ""
+    told: dict[str, str] = dict(re.findall(r"(\d)(?: \([^)]*\))?: ([^,]+)", own.meaning))
+    return told.get(f"{effect.parameters[name].value:.0f}", "")
+
+
 def span95(entry: EffectParameterFound) -> tuple[float, float] | None:
     """95 % interval of a parameter entry: its ``interval`` if given, else value ± 1.96 std."""
     interval = entry.interval

@@ -12,8 +12,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from scipy.stats import chi2
+
 from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate, significant
 from pamrs.diagnosis.evidence._weighing import price_of_term
+from pamrs.diagnosis.fit import Fit
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
     NONE,
@@ -47,6 +50,7 @@ _STRAINED_PARAMETERS = 0.75
 _STRAINED_UNLISTED = 0.25  # probability of unlisted there (decision 4)
 # [tolerances] moved to its wall (fit.most_tolerances), which is suspect (decision 25)
 WALL_TOLERANCES = 2.9
+_UNLIKELY = 0.01  # chance of a baseline below which its values count against it
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +115,23 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
     shifted = any(significant(e) for e in group.nominal.values())
     explained = any(c.wrong and found.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates)
     quiet = {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
-    if parameters_at_wall(group) and group.mismatch is None and not explained:
+    strained = parameters_at_wall(group) or _is_unlikely(group.candidates[0].fit)
+    if strained and group.mismatch is None and not explained:
         quiet = {PARAMETERS: _STRAINED_PARAMETERS, UNLISTED: _STRAINED_UNLISTED}
     elif not shifted:
         quiet |= {NONE: _QUIET_LIKELY, PARAMETERS: _QUIET_OTHER}
     for hypothesis, share in quiet.items():
         found[hypothesis] = found.get(hypothesis, 0.0) + unchanged * share
     return {h: p for h, p in found.items() if p >= _COUNTED or h in WITHOUT_NAME}
+
+
+def _is_unlikely(fit: Fit) -> bool:
+    """Whether values inside their tolerances and starts of gases lie further from what is known of
+    them, together, than one in a hundred draws of them.
+    """
+    moved = sum(abs(far) > 0.0 for far in fit.held_by_prior.values())
+    starts = sum(found.strain > 0.0 for found in fit.residuals.values())
+    return chi2.sf(fit.strain + fit.start_strain, max(1, moved + starts)) < _UNLIKELY
 
 
 def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Judged]:
