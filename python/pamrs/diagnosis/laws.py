@@ -60,8 +60,11 @@ def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:
 
 def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
     """Whether an answer under another law leaves clearly less of the channels that the answer under
-    the stated law misses, or no more of them with fewer names.
+    the stated law misses, or no more of them with fewer names; physics without a name is not better
+    than a name.
     """
+    if other.answer.verdict == "unlisted" and stated.answer.named:
+        return False
     channels = _channels(stated)
     own, before = (_noises(d.proven, channels) for d in (other, stated))
     fewer = len(other.answer.named) < len(stated.answer.named)

@@ -25,7 +25,6 @@ from pamrs.diagnosis.fit import (
     levenberg_marquardt,
     stacked,
     two_at_a_time,
-    with_priors,
 )
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import UNDECIDED
@@ -279,8 +278,8 @@ def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], N
     """A group whose baseline leaves only noise, but moves parameters for it: which one the file is
     wrong about.
 
-    Each that promises it is freed. What speaks for it is what misfit and priors lose together,
-    weighed against the odds of a file that is so wrong.
+    Each that promises it is freed. What speaks for it is how much more probable it makes recordings
+    and values, weighed against the odds of a file that is so wrong.
     """
     start = quiet.candidates[0]
     found = free_suspects(trial, start.fit, start.fit, say, share=0.0)
@@ -291,14 +290,14 @@ def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], N
     ]
     if not shown:
         return quiet
-    autocorrelation = trial.autocorrelation(start.fit)
-    before = with_priors(trial.inner, start.fit, autocorrelation)
     # a file that is further outside its tolerances is rarer, but less and less so
     settings, walls = trial.settings, trial.settings.most_tolerances
-    against = {c: settings.file_log_odds * len(c.wrong) + c.outside(walls) for c in shown}
     scores = {
-        c: 0.5 * (before - with_priors(trial.inner, c.fit, autocorrelation)) - odds
-        for c, odds in against.items()
+        c: _plausibility(c)
+        - _plausibility(start)
+        - settings.file_log_odds * len(c.wrong)
+        - c.outside(walls)
+        for c in shown
     }
     top = max(0.0, *scores.values())
     weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
@@ -307,6 +306,12 @@ def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], N
     kept = 1.0 - sum(share.values())
     probabilities = {UNDECIDED: kept} | share
     return replace(quiet, candidates=[*quiet.candidates, *shown], probabilities=probabilities)
+
+
+def _plausibility(candidate: Candidate) -> float:
+    """Logarithm of how probable a hypothesis makes the recordings, and its own values."""
+    told = sum(found.most for found in candidate.likelihood().values())
+    return told - 0.5 * (candidate.fit.strain + candidate.fit.start_strain)
 
 
 def _carries_over(candidate: Candidate, start: Candidate) -> bool:
