@@ -35,17 +35,6 @@ def test_a_name_is_no_markup(monkeypatch, name):
 
 
 @pytest.mark.parametrize("fault", ["19_name_markup", "20_terminal_escape"])
-def test_names_of_a_case_are_text(fault):
-    case = pamrs.load_case(FAULTS / fault)
-    said = [case.name, *(r.name for r in case.recordings), *case.description.split("\n")]
-    assert not any(ord(letter) < 32 or ord(letter) == 127 for text in said for letter in text)
-    if fault == "19_name_markup":
-        assert case.name == "[/foo]"
-    else:
-        assert case.name == r"\x1b]0;pwn\x07\x1b[2J\x1b[31mred\r\nfake: verdict none"
-
-
-@pytest.mark.parametrize("fault", ["19_name_markup", "20_terminal_escape"])
 def test_a_diagnosis_on_a_terminal_prints_names_as_text(fault, tmp_path):
     """Progress and result, as a person sees them."""
     pty = pytest.importorskip("pty")

@@ -12,10 +12,8 @@ from pamrs.control import PID, closed_loop
 from pamrs.control.linear import equilibrium, linear_controller, linearise
 from pamrs.control.stability import margins
 from pamrs.control.trajectories import step
-from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from tests.control.helpers import SmallPid
-from tests.control.test_linear import settle, settled
 from tests.simulation.refusals import refused
 from tests.tables import rows_of
 
@@ -47,25 +45,6 @@ def test_states_of_effects_are_in_the_model(rig, effect):
     assert np.abs(out / other - 1.0).max() > 1e-3
 
 
-def test_a_lag_is_one_and_leaves_the_rest_as_it_is(rig):
-    bare = linearise(rig, ANGLE)
-    lagged = linearise(rig.with_effect("pressure_lag", {"time_constant": 0.005}), ANGLE)
-    # T y' = p - y
-    assert lagged.a[3] == pytest.approx([200.0, 0.0, 0.0, -200.0], rel=1e-12, abs=0.0)
-    assert lagged.b[0] == pytest.approx(bare.b[0], rel=1e-12)
-    read = lagged.c[lagged.outputs.index("muscle_pressure")]
-    assert read == pytest.approx([0.0, 0.0, 0.0, 1.0], abs=0.0)
-    late = linearise(rig.with_effect("input_path_lag", {"time_constant": 0.02}), ANGLE)
-    assert late.states[3:] == ("input_path_lag.lag",)
-    assert late.a[3] == pytest.approx([0.0, 0.0, 0.0, -50.0], rel=1e-12, abs=0.0)
-    assert late.b[3, 0] == pytest.approx(50.0 / 5.0, rel=1e-12)  # of the half range
-    assert late.a[0, 3] == pytest.approx(bare.b[0, 0] * 5.0, rel=1e-9)
-    # a lag in the loop costs what the same delay costs, to first order
-    controller = PID(0.5, 0.0, 0.0, period=0.005)
-    spare = [margins(model, controller).delay for model in (bare, late)]
-    assert spare[0] - spare[1] == pytest.approx(0.02, rel=0.2)
-
-
 @pytest.mark.parametrize("effect", KINKED)
 def test_what_has_no_linear_model_is_refused_by_name(rig, effect):
     with pytest.raises(ParameterError, match=f"{effect}.*no linear model"):
@@ -90,18 +69,6 @@ def test_play_and_dead_zone_of_no_width_and_lags_of_no_time_are_none(rig):
         assert getattr(model, name) == pytest.approx(getattr(bare, name), rel=1e-9, abs=1e-9)
 
 
-def test_every_effect_is_known_and_all_together_too(rig):
-    every = rig
-    for effect in reversed(EFFECTS):
-        elsewhere = effect.startswith("supply_regulator") or effect == "line_flow_law"
-        if effect not in KINKED and not elsewhere:
-            every = every.with_effect(effect)
-    model = linearise(every, ANGLE)
-    assert np.linalg.eigvals(model.a).real.max() < 1.0
-    some = {"payload_swing.rate", "base_flexibility.angle", "muscle_creep", "pressure_lag"}
-    assert some < set(model.states)
-
-
 def test_a_command_that_moves_nothing_is_refused(rig):
     start = equilibrium(rig, ANGLE)
     with pytest.raises(ParameterError, match="valve_command moves nothing"):
@@ -115,15 +82,6 @@ def test_zeros_of_sensors_move_no_operating_point(rig):
     assert read.b == pytest.approx(true.b, rel=1e-9, abs=1e-9)
     assert read.point["joint_angle"] == pytest.approx(ANGLE + 0.05)  # what a controller sees there
     assert read.point["muscle_pressure"] == pytest.approx(true.point["muscle_pressure"] + 700.0)
-
-
-def test_of_several_joints_each_has_to_rest():
-    rig, given = settled("two_joint_arm")
-    with pytest.raises(ParameterError, match=r"joint_rate\.wrist.*does not rest"):
-        linearise(rig, **given)
-    model = linearise(rig, **settle(rig, given), side="fill")
-    assert np.linalg.eigvals(model.a).real.max() < 1e-3
-    assert model.inputs == ("valve_command.elbow", "valve_command.wrist")
 
 
 def test_dry_friction_at_rest_and_in_motion_have_boundaries_of_their_own(rig):

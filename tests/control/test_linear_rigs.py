@@ -11,14 +11,10 @@ import pytest
 import pamrs
 from pamrs.control import (
     PID,
-    ArmModel,
-    Cascade,
-    PressureLoop,
     Recruitment,
     Reference,
     RigController,
     RigModel,
-    Sliding,
     closed_loop,
 )
 from pamrs.control.linear import linear_controller, linearise
@@ -143,40 +139,6 @@ def test_each_loop_is_at_its_boundary_at_its_gain_margin(held):
         boundary = margins(model, turned, command=name, delay=0.004)
         assert boundary.radius == pytest.approx(1.0, abs=2e-4)
     assert finite
-
-
-def test_each_loop_is_at_its_boundary_at_its_phase_margin(held):
-    """One command is turned back by it at its frequency: ``det(1 - K P D) = 0`` there."""
-    *_, model, linear, _ = held
-    phi, gamma = model.sampled(PERIOD)
-    pick = np.array([[float(name == out) for out in model.outputs] for name in linear.inputs])
-    for k, name in enumerate(linear.outputs):
-        one = margins(model, linear, command=name)
-        z = np.exp(1j * one.phase_frequency * PERIOD)
-        plant = pick @ model.c @ np.linalg.solve(z * np.eye(phi.shape[0]) - phi, gamma)
-        inner = np.linalg.solve(z * np.eye(linear.a.shape[0]) - linear.a, linear.b)
-        turned = np.ones(len(model.inputs), dtype=complex)
-        turned[k] = np.exp(-1j * one.phase)
-        loop = (linear.c @ inner + linear.d) @ plant
-        nothing = np.linalg.det(np.eye(turned.size) - loop @ np.diag(turned))
-        assert abs(nothing) < 1e-3 * abs(np.linalg.det(np.eye(turned.size) - loop))
-        assert one.delay == pytest.approx(one.phase / one.phase_frequency)
-
-
-def test_the_shoulder_as_a_rig_is_the_loop_of_its_cascade():
-    rig = pamrs.rigs.shoulder()
-    model = linearise(rig, ELBOW, side="fill")
-    known, arm = RigModel(rig), ArmModel.from_rig(rig)
-    way = PressureLoop(period=PERIOD)
-    whole = RigController(known, Sliding(known.arm, period=PERIOD), air={"": way})
-    parts = Cascade(Sliding(arm, period=PERIOD), PressureLoop(period=PERIOD))
-    one, other = (linear_controller(c, model.point) for c in (whole, parts))
-    assert one.outputs == ("valve_command",)
-    assert one.command == {"valve_command": pytest.approx(other.command)}
-    found, expected = (margins(model, c, delay=0.003) for c in (one, other))
-    assert found.radius == pytest.approx(expected.radius, rel=1e-9)
-    assert found.gain == pytest.approx(expected.gain, rel=1e-6)
-    assert found.phase == pytest.approx(expected.phase, rel=1e-6)
 
 
 def test_a_regulated_rig_has_its_set_pressure_as_input():

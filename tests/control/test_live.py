@@ -146,15 +146,6 @@ def test_a_lost_sensor_is_a_safe_stop(rig, safe):
     assert command == safe
     assert when == pytest.approx(2.03)
     assert run.time[-1] == pytest.approx(2.03)
-    angle = device.simulator.observe()["joint_angle"]
-    after = pamrs.Simulator(rig, sample_time=0.001)
-    after.restore(device.simulator.state)
-    moved = after.run(np.full(3000, safe))["joint_angle"][-1]
-    if safe == 0.0:
-        assert moved < math.radians(20)  # vented, the arm comes down
-    else:
-        assert abs(moved - angle) < math.radians(25)  # closed, it stays about where it was
-        assert moved > math.radians(25)
 
 
 @pytest.mark.parametrize("safe", [5.0, 0.0])
@@ -243,13 +234,6 @@ class Failing(SmallPid):
                 return self.error
             raise self.error
         return super().update(time, measurement, reference)
-
-
-def test_ctrl_c_gives_the_record_and_the_safe_command(rig):
-    run, device = live(rig, Failing(KeyboardInterrupt()), safe=0.0)
-    assert run.reason == "interrupted"
-    assert run.time.size == 100
-    assert device.written[-1][1] == 0.0
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("oh"), math.nan])

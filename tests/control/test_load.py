@@ -95,18 +95,6 @@ def test_every_law_follows_a_length(kind):
     refused(("'deg' is not allowed: 'm' is needed", lambda: run.metrics(unit="deg")))
 
 
-def test_what_is_left_of_a_feedforward_is_the_lag_of_its_pressure():
-    """Begun on the trajectory, on its own model: an error that falls with kM and no other."""
-    errors = []
-    for km in (20.0, 100.0):
-        law = MODEL.law("feedforward", period=PERIOD, friction=True)
-        controller = RigController(MODEL, law, km=km)
-        start = controller.holding(LIFT(0.0).angle)
-        errors.append(rms(closed_loop(SMOOTH, controller, LIFT, 10.0, initial=start), 0.0)[1])
-    assert errors[0] < 1.0
-    assert errors[1] < 0.4 * errors[0]
-
-
 def test_the_rig_s_controller_is_the_one_of_its_muscle_by_length():
     law = MODEL.law("sliding", period=PERIOD)
     loop = MODEL.pressure_loop("", period=PERIOD)
@@ -168,17 +156,6 @@ def test_rest_is_a_part_of_the_stroke():
     linearise(SMOOTH, initial=falling(1e-3))
     told = r"length_rate is 2.*e-06 m/s.* does not rest"
     refused((told, lambda: linearise(SMOOTH, initial=falling(1e-2))))
-
-
-def test_a_live_loop_and_many_plants_follow_a_length_too():
-    controller = ByLength(PID(100.0, 100.0, period=0.01), RIG)
-    alone = closed_loop(RIG, controller, LIFT, 2.0, sample_time=0.001)
-    clock = VirtualClock()
-    run = run_live(SimulatedDevice(RIG, clock), controller, LIFT, 2.0, clock=clock)
-    assert run.channels["length"] == pytest.approx(alone.angle[:-1:10], abs=1e-9)
-    both = ByLength(PID(np.array([50.0, 100.0]), 100.0, period=0.01), RIG)
-    many = sweep(RIG, both, LIFT, 2.0, n=2)
-    assert many.final[1] == pytest.approx(alone.error[-1], abs=1e-7)
 
 
 def test_what_cannot_be_is_named():

@@ -58,21 +58,6 @@ def test_squared_error_rms_and_lag_of_known_signals():
     assert m.lag(time, np.ones_like(time), 0 * time) == 0.0
 
 
-@pytest.mark.parametrize(("zeta", "w"), [(0.2, 5.0), (0.5, 3.0), (0.7, 8.0)])
-def test_step_of_a_damped_second_order(zeta, w):
-    """Omega of a step is the sum of the changes of ``v / sqrt(1 + v^2)`` between the extremes of
-    the rate, which are where tan(d t) = d / (zeta w).
-    """
-    time = np.linspace(0.0, 60.0 / w, 60001)
-    y, rate = second_order(zeta, w, time)
-    d = w * math.sqrt(1 - zeta**2)
-    when = (math.atan2(d, zeta * w) + math.pi * np.arange(60)) / d
-    extremes = np.concatenate([[0.0], 0.5 * second_order(zeta, w, when)[1]])
-    variation = np.abs(np.diff(extremes / np.sqrt(1 + extremes**2))).sum()
-    found = m.total_curvature(time, 0.3 + 0.5 * y, rate=0.5 * rate)
-    assert found == pytest.approx(variation, rel=1e-4)
-
-
 def test_a_batch_is_its_runs():
     time = np.linspace(0.0, 12.0, 1201)
     runs = [second_order(z, 3.0, time) for z in (0.2, 0.5, 0.8, 0.3)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from benchmarks.recruitment import bundle, follow
+from benchmarks.recruitment import follow
 from pamrs.control import Demand, Recruitment, RigController, RigModel, closed_loop
 from pamrs.control.trajectories import cosine_cycles, degrees
 from tests.simulation.refusals import refused
@@ -134,25 +134,6 @@ def test_a_supply_that_runs_low_is_filled_from_slowly():
     assert rates[0] == pytest.approx(PERIOD / 0.5)
 
 
-def test_a_batch_is_its_plants_and_a_state_goes_on():
-    torques = np.array([0.3, 1.2, 2.2]) * capacity(1)
-    wave = 1.0 + 0.4 * np.sin(np.arange(1500) * 0.01)
-    batch, single = scheduler(), [scheduler() for _ in range(3)]
-    for k, factor in enumerate(wave):
-        together = batch.pressures(demand(k, torques * factor, np.full(3, ANGLE)))
-        for row, one in enumerate(single):
-            alone = one.pressures(demand(k, float(torques[row] * factor)))
-            assert all(type(value) is float for value in alone)
-            np.testing.assert_allclose([p[row] for p in together], alone, rtol=1e-12, atol=1e-6)
-        if k == 700:
-            state = single[1].state
-            fresh = scheduler()
-            fresh.restore(state)
-            single[1] = fresh
-    assert [one.active for one in single] == batch.active.tolist()
-    assert batch.active[0] < batch.active[2] == 3.0
-
-
 def test_lifts_take_less_air_than_with_a_fixed_number_that_can():
     """One cycle without a payload and one with 36 kg, which a single pair cannot lift."""
     payloads, volume = (0.0, 36.0), 0.015
@@ -220,17 +201,6 @@ def test_a_tank_that_runs_empty_is_not_starved():
     _, early, sooner = lifts_from_a_small_tank(6e5, reserve=1.5e5)
     assert early[0] > above[0]
     assert all(a >= b for a, b in zip(sooner, pairs, strict=True))
-
-
-def test_a_bundle_of_small_muscles_lifts_as_the_six():
-    payload = 20.0
-    whole = follow(RIG, [payload], fixed=3)
-    small = follow(bundle(12), [payload], scheduler={"reach": math.radians(90.0), "least": 2})
-    assert whole.rms() < 0.15
-    assert small.rms() < 0.15
-    assert 2.0 <= small.active.max() <= 6.0
-    assert small.work == pytest.approx(whole.work, rel=0.02)
-    assert small.energy(0.015) < 0.9 * whole.energy(0.015)
 
 
 def test_what_cannot_be_recruited_is_named():

@@ -25,7 +25,7 @@ from pamrs.control import (
 )
 from pamrs.control.trajectories import cosine_cycles, degrees, step
 from pamrs.rig import Rig
-from tests.control.helpers import CONDUCTANCE, reference_arm, with_iso_valve, without_friction
+from tests.control.helpers import without_friction
 from tests.simulation.refusals import refused
 
 PERIOD = 0.005
@@ -189,20 +189,6 @@ def test_a_push_turns_the_joint_by_what_its_stiffness_says(wanted):
 # ---------------------------------------------------------------- several joints
 
 
-def test_inverse_dynamics_are_those_of_the_reference_arm():
-    rng = np.random.default_rng(4)
-    model, arm = PlanarArmModel.from_rig(ARM), reference_arm(ARM)
-    for _ in range(30):
-        angle, rate, acceleration = rng.uniform(-2.0, 2.0, (3, 2))
-        expected = arm.inverse_dynamics(angle.tolist(), rate.tolist(), acceleration.tolist())
-        found = model.inverse_dynamics(angle, rate, rate, acceleration)
-        friction = model.viscous * rate
-        assert found - friction == pytest.approx(expected, rel=1e-12, abs=1e-12)
-        # the reference's own accelerations under that torque are those that were asked for
-        back = arm.acceleration(angle.tolist(), rate.tolist(), (found - friction).tolist())
-        assert back == pytest.approx(acceleration, rel=1e-9, abs=1e-9)
-
-
 def test_rows_of_a_batch_are_its_plants_and_columns_sum_to_the_torque():
     rng = np.random.default_rng(5)
     model, n = PlanarArmModel.from_rig(ARM), 4
@@ -349,28 +335,6 @@ def test_every_law_runs_on_every_rig(name, kind):
         assert values.max() <= top
 
 
-def on_the_way(model, law, trajectory, stiffness=None):
-    """A start at which the joints are where they should be, with the pressures that they need."""
-    each = trajectory if isinstance(trajectory, dict) else {model.joints[0]: trajectory}
-    at_once = [one(0.0) for one in each.values()]
-    aim = at_once[0] if len(each) == 1 else type(at_once[0])(*np.array(at_once).T)
-    drive = law.update(0.0, {}, aim)
-    torque, _ = model.arm.torque.at(aim.angle)
-    start = {}
-    for k, name in enumerate(model.joints):
-        u, c1, angle = (float(np.atleast_1d(v)[k]) for v in (drive, torque, aim.angle))
-        start[dotted("joint_angle", name)] = angle
-        groups = model.of_joint(name)
-        pressures = [u] * len(groups)
-        if model.opposed(name):
-            share = CoContraction(model.torques_of(name), LIMIT, stiffness=stiffness)
-            pressures = share.pressures(demand(u * c1, angle))
-        for group, pressure in zip(groups, pressures, strict=True):
-            start[dotted("muscle_pressure", group.chamber)] = pressure
-    law.reset()
-    return start
-
-
 #: Largest error [deg] of feedforward alone on its own model, kM = 20 and 100 /s.
 ALONE = {
     "shoulder": ((1.33,), (0.27,)),
@@ -390,8 +354,9 @@ def test_feedforward_alone_follows_on_its_own_model_as_fast_as_its_pressure(name
     model = RigModel(rig)
     for km, bound in zip((20.0, 100.0), ALONE[name], strict=True):
         law = model.law("feedforward", friction=True, period=PERIOD)
-        start = on_the_way(model, law, trajectory, **others)
         controller = RigController(model, law, km=km, **others)
+        each = trajectory if isinstance(trajectory, dict) else {"": trajectory}
+        start = controller.holding(np.array([one(0.0).angle for one in each.values()]))
         run = closed_loop(rig, controller, trajectory, 10.0, initial=start)
         assert np.all(rms(run, 0.0)[1] < 1.15 * np.array(bound))
 
@@ -436,42 +401,6 @@ def test_a_regulator_is_asked_for_the_pressure_itself():
         wanted = alone.update(time, {}, LIFT(time))
         assert run.command["supply_command"][row] == wanted
         alone.reset()
-
-
-SAME_VALVE = with_iso_valve(
-    pamrs.rigs.shoulder(), (CONDUCTANCE, 0.528), (CONDUCTANCE, 0.528)
-)  # the area's own numbers
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_an_iso_valve_follows_as_its_equivalent_area(kind):
-    """Both by the controller's inverse of its own valve; the flows differ by 0.8 % at most."""
-    errors = []
-    for rig in (pamrs.rigs.shoulder(), SAME_VALVE):
-        model = RigModel(rig)
-        law = model.law(kind, period=PERIOD, **OPTIONS.get(kind, {}))
-        errors.append(rms(closed_loop(rig, RigController(model, law), LIFT, 10.0))[0][0])
-    assert errors[1] == pytest.approx(errors[0], rel=0.02)
-    assert errors[1] < 1.15 * FOUND["shoulder"][KINDS.index(kind)]
-
-
-def test_a_free_exhaust_and_a_narrow_inlet_are_both_inverted():
-    """What is left of the error is the lag of the pressure, that of kM and of no valve; a model
-    with one area for both paths is off by what it does not know.
-    """
-    area = without_friction("shoulder")
-    rig = with_iso_valve(area, (0.4 * CONDUCTANCE, 0.25), (1.5 * CONDUCTANCE, 0.45))
-
-    def largest(rig, known):
-        model = RigModel(known)
-        law = model.law("feedforward", period=PERIOD)
-        start = on_the_way(model, law, LIFT)
-        run = closed_loop(rig, RigController(model, law, km=20.0), LIFT, 10.0, initial=start)
-        return rms(run, 0.0)[1][0]
-
-    lag = largest(area, area)
-    assert largest(rig, rig) == pytest.approx(lag, rel=0.002)
-    assert largest(rig, area) > 2.0 * lag
 
 
 def test_a_valve_behind_a_supply_line_is_fed_from_what_stands_in_front_of_it():

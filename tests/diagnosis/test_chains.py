@@ -17,7 +17,6 @@ from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment import measurable, propose
 from pamrs.diagnosis.next_experiment._asked import _Question, _telling
-from pamrs.diagnosis.next_experiment._differences import noise_of
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -37,7 +36,6 @@ from pamrs.experiments._protocols import _LEAST_HIGHEST
 from pamrs.recordings import Recording, load_recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig, replay
-from tests.diagnosis import synthetic
 from tests.diagnosis.asked import SETTINGS
 from tests.diagnosis.noisy import whole
 from tests.simulation.test_spools import PAIR
@@ -258,19 +256,6 @@ def test_the_file_of_an_experiment_is_played_by_its_rig(
     assert len(out.read_text(encoding="utf-8").splitlines()) == experiment.rows + 1
 
 
-def test_what_lines_join_is_filled_one_by_one() -> None:
-    for name in ("tube", "long_tube"):
-        rig = pamrs.rigs.named(name)
-        pool = library(rig, SETTINGS)
-        over = [e for e in pool if e.kind == "blow_over"]
-        assert [e.name for e in over] == ["blow_over.left", "blow_over.right"]
-        for experiment in over:
-            run = experiment.simulate(rig)
-            apart = run["muscle_pressure.left"] - run["muscle_pressure.right"]
-            assert abs(apart[0]) > 3e5
-            assert abs(apart[-1]) < 0.02 * abs(apart[0])
-
-
 def test_a_question_about_a_chamber_moves_its_own_chain() -> None:
     assert asked_of(JOINT) == {
         "supply": "sealed_hold",
@@ -465,23 +450,3 @@ def test_two_regulators_and_pulsed_valves_are_planned(monkeypatch) -> None:
     leak = planned(monkeypatch, PULSED, ("sealed_hold",), "leak_muscle", "valve_area")()
     assert leak.sight("leak_muscle").verdict == "seen"
     assert leak.channels == measurable(PULSED)
-
-
-def test_the_place_of_a_leak_is_asked_of_the_muscle_that_may_have_it() -> None:
-    leak = {"conductance": 5e-12}
-    leaking = {side: JOINT.with_effect("leak_muscle", leak, at=side) for side in SIDES}
-    hypotheses = [(f"leak_muscle@{side}", rig, 0.5) for side, rig in leaking.items()]
-    pool = only(JOINT, "step_and_shut.flexor")
-    found = propose(JOINT, hypotheses, noise_of(JOINT), experiments=pool)
-    assert found.expected_information_bits > 0.9
-    assert "at flexor" in found.text
-    assert set(found.protocol.commands) == {f"valve_command.{side}" for side in SIDES}
-    (pair,) = found.pairs
-    assert pair.between == [f"leak_muscle@{side}" for side in SIDES]
-    pytest.importorskip("matplotlib")
-    pytest.importorskip("jinja2")
-    from pamrs.report import render_html
-
-    page = render_html(synthetic.diagnosis(next_experiment=found, traces=[]))
-    held = found.excitation["held_bar"]["extensor"]
-    assert f"extensor: {held:.3g}" in page

@@ -174,22 +174,3 @@ def test_printed_chambers(name: str, leaks: bool) -> None:
         assert leak < 0.9
         (slow,) = (e for e in found.effects if e.id == "leak_muscle")
         assert slow.parameters["time_constant"].value > 1e4
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["none", "leak_muscle"])
-def test_small_blinded_trial(kind: str, tmp_path: Path) -> None:
-    from trial import make_case
-
-    made = make_case(
-        tmp_path / "cases", tmp_path / "keys", kind, seed=2014, recordings=4, duration=12.0
-    )
-    assert made is not None
-    (folder,) = sorted((tmp_path / "cases").glob("case_*"))
-    found = pamrs.diagnose(folder)
-    if kind == "none":
-        assert found.verdict in ("none", "parameters")
-    else:
-        assert found.verdict == "effects"
-        assert found.effects[0]["id"] == "leak_muscle"
-    kept(found)

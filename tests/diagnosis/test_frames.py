@@ -75,17 +75,6 @@ def test_what_small_strokes_leave_open_is_settled_by_what_is_proposed(effect, st
     assert best.probabilities[effect] > 0.8
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("effect", OPEN)
-def test_small_strokes_once_more_settle_nothing(effect, strokes) -> None:
-    first = strokes(effect)
-    protocol = first.next_experiment.protocol
-    # the first recording once more, for as long as what is proposed
-    repeated = after(effect, *frames.strokes(0, protocol.time.size))
-    assert repeated.ambiguity != []
-    assert repeated.probabilities[effect] < 0.65
-
-
 @FRAMES
 def test_experiments_keep_to_what_a_frame_can_do(rig: pamrs.Rig) -> None:
     pool = {e.name: e for e in library(rig, SETTINGS, sample_time=0.01)}

@@ -35,7 +35,7 @@ from pamrs.experiments import Experiment, library
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
-from tests.diagnosis import again, test_places
+from tests.diagnosis import again
 from tests.diagnosis.asked import SETTINGS, diagnosed
 from tests.diagnosis.likelihoods import made_up
 from tests.diagnosis.noisy import driven
@@ -260,32 +260,6 @@ def test_every_open_pair_has_an_experiment(wrong: bool, monkeypatch) -> None:
         assert first.noises > 1.0
     assert "Next experiment" in found.summary()
     assert found.to_dict()["next_experiment"]["pairs"]
-
-
-@pytest.mark.slow
-def test_an_open_place_of_an_effect_gets_an_experiment_that_plays(
-    tmp_path, capsys, monkeypatch
-) -> None:
-    monkeypatch.setattr(_choice, "_LEAST_PROBABILITY", 5e-4)
-    leak = ANTAGONISTS.with_effect("leak_muscle", {"conductance": 2e-11}, at="flexor")
-    made = [test_places.recorded(leak, "fit", k) for k in range(2)]
-    found = diagnosed(ANTAGONISTS, lambda _, k: made[k], ("fit", "fit"), OPEN)
-    assert found.ambiguity
-    asked = found.next_experiment
-    assert asked.pairs
-    assert asked.protocol is not None
-    assert set(asked.protocol.commands) == {"valve_command.flexor", "valve_command.extensor"}
-    assert asked.excitation["kind"] in {asked.protocol.name, asked.protocol.name.partition(".")[0]}
-    run = pamrs.simulate(
-        ANTAGONISTS,
-        {name.partition(".")[2]: u for name, u in asked.protocol.commands.items()},
-        sample_time=float(asked.protocol.time[1]),
-    )
-    for side in ("flexor", "extensor"):
-        name = f"muscle_pressure.{side}"
-        highest = max(float(np.max(r.channels[name])) for r in made)
-        assert float(run[name].max()) <= 1.12 * highest
-    assert "chamber of flexor" in found.summary()
 
 
 def test_an_effect_and_parameters_that_moved_are_simulated_as_a_pair() -> None:

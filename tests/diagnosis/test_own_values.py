@@ -217,15 +217,6 @@ def test_what_a_rig_file_cannot_say_of_them(entry: str, message: str) -> None:
         parse_rig(text)
 
 
-def test_a_leak_of_each_day_is_a_value_of_its_own() -> None:
-    rig = SHOULDER.with_effect("leak_muscle", {"conductance": 1e-9})
-    (record, *_) = nozzles(error="")
-    name = "leak_muscle.conductance"
-    own = replace(record, parameters={name: OwnValue(3e-9, 1e-9, "own")})
-    assert own.rig_there(rig).effects[0]["parameters"]["conductance"] == 3e-9
-    assert rig.effects[0]["parameters"]["conductance"] == 1e-9
-
-
 def written(folder: Path, parameters: str) -> Path:
     SHOULDER.to_toml(folder / "rig.toml")
     time = np.arange(0.0, 0.5, DT)

@@ -154,13 +154,6 @@ def test_without_the_angle_the_arm_is_not_isolable(few) -> None:
     assert "not arm (muscle, joint and arm): without joint_angle" in found.text()
 
 
-def test_without_the_supply_the_arm_alone_is_left(few) -> None:
-    found = few("muscle_pressure", "joint_angle")
-    assert [b["name"] for b in found.blocks] == ["arm"]
-    assert found.sight("leak_muscle").verdict == "not seen"
-    assert found.sight("muscle_hysteresis").verdict == "seen"
-
-
 def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

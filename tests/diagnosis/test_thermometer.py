@@ -18,7 +18,6 @@ from pamrs.diagnosis.prepare import available_blocks, thermometers_of
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.experiments import library
 from pamrs.recordings import Recording, propose
-from pamrs.report.chain import chain_svg
 from pamrs.rig import parse_rig
 from tests.diagnosis.asked import ROLES
 from tests.diagnosis.noisy import GAUGES, noisy, without
@@ -208,33 +207,6 @@ def test_a_plan_knows_which_gas_may_have_a_thermometer() -> None:
     assert measurable(parse_rig(COEFFICIENTS), "temperature") == ()
     with pytest.raises(pamrs.errors.ParameterError, match="'temperature', which is not allowed"):
         checked_channels(parse_rig(COEFFICIENTS), ("muscle_pressure", "temperature"))
-
-
-@pytest.mark.slow
-def test_a_plan_says_what_a_thermometer_would_tell() -> None:
-    rig, channels = parse_rig(WARM), ["valve_command", "supply_pressure", "muscle_pressure"]
-    plan = pamrs.plan_diagnosis(rig, channels, experiments=["step_and_shut"])
-    assert plan.sight("thermometer_lag").verdict == "not seen"
-    (more,) = [a for a in plan.additions if a.name == "temperature"]
-    assert "thermometer_lag" in more.seen
-    then = pamrs.plan_diagnosis(rig, [*channels, "temperature"], experiments=["step_and_shut"])
-    assert then.sight("thermometer_lag").verdict == "seen"
-    (own,) = [b for b in then.blocks if b["name"] == "temperature"]
-    assert own["covers"] == "gas"
-    (chamber,) = [b for b in then.blocks if b["name"] == "chamber"]
-    assert "temperature" not in chamber["why"]
-
-
-def test_the_drawing_has_the_thermometer_in_the_chamber(slowly: pamrs.Diagnosis) -> None:
-    found = slowly
-    drawn = chain_svg(found)
-    assert drawn is not None
-    assert "temperature" in drawn
-    assert "missing:" in drawn
-    assert "thermometer lag" in drawn
-    text = found.summary()
-    assert "temperature" in text
-    assert "budget of the temperature" in text.lower()
 
 
 def logged(folder: Path, columns: dict[str, np.ndarray]) -> Path:

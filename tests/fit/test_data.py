@@ -464,13 +464,6 @@ def test_wrong_lengths_name_the_rest_length_too(tmp_path, heading, rest, words):
     refused(tmp_path, text, f"{re.escape(words)}$", rest_length=rest)
 
 
-def test_bar_under_a_heading_in_psi_does_not_blame_the_forces_alone(tmp_path):
-    data = loaded(tmp_path, csv_text("length [mm],pressure [psi],force [N]"))
-    message = r"forces are too large.*, or the pressures are too small \(in bar, read as psi\?\)"
-    with pytest.raises(RecordingError, match=message):
-        data.checked_against(fake_muscle())
-
-
 def test_where_on_a_measured_column_keeps_it(tmp_path):
     text = csv_text().replace(",1,", ",1.000,")
     for value in ("1.000", "1", 1.0):

@@ -130,6 +130,15 @@ def _round(file: Any) -> None:
     file["p"] = np.arange(100.0)
 
 
+def _doubled(file: Any) -> None:
+    """Twenty groups in each other with two names each: a million paths."""
+    inner = file
+    for _ in range(20):
+        outer, inner = inner, inner.create_group("a")
+        outer["b"] = inner
+    inner["p"] = np.arange(100.0)
+
+
 def _arrow(ending: str) -> Writer:
     def write(home: Path) -> list[str]:
         import pyarrow as pa
@@ -297,6 +306,7 @@ def entries() -> Iterator[Entry]:
     yield Entry("HDF5 bomb of 3.9 GB", _hdf(_bomb), "rows")
     yield Entry("HDF5 groups in groups in groups", _hdf(_nested), "nested")
     yield Entry("HDF5 group that holds itself", _hdf(_round))
+    yield Entry("HDF5 groups with a million paths", _hdf(_doubled))
     yield Entry("MATLAB bomb", _log("run.mat", _mat()), "cells")
     yield Entry("Parquet of too many rows", _arrow("parquet"), "rows")
     yield Entry("Feather of one packed batch", _arrow("feather"), "rows")
@@ -335,6 +345,7 @@ def entries() -> Iterator[Entry]:
     yield Entry("a key of 20,000 dots", _rig(f"{'a.' * 20_000}b = 1\n"), "nested")
     yield Entry("a key of 20,000 quoted dots", _rig('"a".' * 20_000 + "b = 1\n"), "nested")
     yield Entry("lists in lists", _rig(_json_like(40)), "nested")
+    yield Entry("tables in tables", _rig("a = " + "{a=" * 40 + "1" + "}" * 40), "nested")
     yield Entry("lists in lists without end", _rig(_json_like(100_000)), "nested")
     for size in (400, 5000):
         yield Entry(f"a whole number of {size} digits", _rig(f"{SHOULDER}\nx = 1{'0' * size}\n"))

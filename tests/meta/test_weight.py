@@ -19,28 +19,28 @@ ROOT = Path(__file__).parents[2]
 
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
-    ".": 1195,
-    "cli": 1498,
-    "control": 5220,
-    "design": 1371,
-    "diagnosis": 10085,
+    ".": 1139,
+    "cli": 1380,
+    "control": 4744,
+    "design": 548,
+    "diagnosis": 10247,
     "effects": 409,
-    "experiments": 1038,
-    "findings": 622,
-    "fit": 3534,
-    "library": 283,
-    "recordings": 4882,
-    "report": 2112,
-    "rig": 2077,
-    "rigs": 137,
-    "simulation": 1108,
+    "experiments": 1068,
+    "findings": 787,
+    "fit": 3065,
+    "library": 71,
+    "recordings": 4903,
+    "report": 2093,
+    "rig": 2184,
+    "rigs": 139,
+    "simulation": 1110,
     "studio": 681,
-    "sweeps": 1044,
+    "sweeps": 830,
 }
 #: The same of what is not the package.
-ASIDE = {"tests": 29311, "trial": 5056, "reproduction": 4284}
+ASIDE = {"tests": 29154, "trial": 5358, "reproduction": 4960}
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37296
+MOST = 35398
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

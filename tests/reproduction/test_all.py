@@ -244,16 +244,3 @@ def test_command_writes_pages_tables_and_pictures(capsys, tmp_path, monkeypatch)
         assert (folder / chapter / "facts.csv").is_file()
     main([*words, "--no-search"])
     assert "Made by `make reproduce without searches`" in (folder / "README.md").read_text()
-
-
-def test_command_that_is_stopped_says_that_it_goes_on(tmp_path, monkeypatch):
-    def section(name, **_):
-        if name == "ch3":
-            raise KeyboardInterrupt
-        return SECTION
-
-    monkeypatch.setattr(reproduction, "section", section)
-    with pytest.raises(SystemExit, match="what was finished is kept, the same command goes on"):
-        main([str(tmp_path / "out"), "--cache", str(tmp_path / "cache")])
-    assert len(list((tmp_path / "cache").iterdir())) == 1
-    assert not (tmp_path / "out").exists()

@@ -231,22 +231,6 @@ def test_lines_that_a_braid_turns_are_those_whose_verdict_it_changes(rows):
     assert fact.ours == pytest.approx(float(blocked) / 4.4482216152605, rel=1e-6)
 
 
-def test_every_fact_has_a_source_in_the_chapter(rows):
-    for row in rows:
-        assert re.search(r"\b3\.\d|Table 3", row.where), row
-        assert (
-            row.unit
-            or row.relation != "equals"
-            or row.tolerance
-            or row.published == int(row.published)
-        )
-    assert len({(row.group, row.fact) for row in rows}) == len(rows)
-    places = " ".join(row.where for row in rows)
-    for place in ["3.2.2", "3.2.3", "3.2.4", "3.2.5", "3.3.2", "3.4", "3.5", "3.6"]:
-        assert place in places
-    assert all(name in places for name in ("Table 3.1", "Table 3.2", "Table 3.3", "Fig. 3.16"))
-
-
 def test_verdicts_of_the_chapter(rows):
     own = [
         row

@@ -1,6 +1,5 @@
 """Chapter 4 beside ours: small runs of its experiments, and how its statements are judged."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from pamrs.control import PID, closed_loop
 from pamrs.control.metrics import evaluate
 from pamrs.errors import ParameterError
-from pamrs.rig import Joint
 from reproduction import chapter4, lift
 from reproduction.chapter4_statements import SERIES, statements
 from reproduction.elbow import PSI
@@ -173,18 +171,6 @@ def test_the_printed_muscle_lets_go_at_its_free_contraction():
     once, twice = (float(one.force(0.0, 0.2, 1.0)) for one in (muscle, stiff))
     assert twice == pytest.approx(2.0 * once, rel=1e-12)
     assert once == pytest.approx(0.8 * float(muscle.force(0.0, 0.2, -1.0)), rel=1e-12)
-
-
-def test_the_predicted_pressure_holds_the_arm():
-    run = made()
-    wanted = lift.predicted(run, PAYLOADS[1:3])
-    rig = lift.assumed().with_parameters({"arm.payload": PAYLOADS[2]})
-    arm, hold = rig.model["arm"], int(np.argmin(np.abs(TIME - 12.0)))
-    joint = Joint.from_model(rig.model["joint"])
-    torque = joint.torque(rig.muscle, wanted[1, hold], math.radians(lift.HIGH), count=6)
-    weight = (arm["first_moment"] + arm["payload"] * arm["length"]) * arm["gravity"]
-    assert float(torque) == pytest.approx(weight * math.sin(math.radians(lift.HIGH)), rel=1e-6)
-    assert np.all(wanted[1] > wanted[0])
 
 
 def test_an_error_too_small_for_a_figure_decides_nothing():

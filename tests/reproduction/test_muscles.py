@@ -13,7 +13,7 @@ from pamrs.errors import ParameterError
 from reproduction.comparison import verdicts
 from reproduction.identify import derive, gent_modulus, least_norm
 from reproduction.muscles import facts
-from reproduction.muscles.evaluate import KINDS, activation_pressure, root_between
+from reproduction.muscles.evaluate import KINDS, activation_pressure
 from reproduction.muscles.published import compare
 from reproduction.six_against_two import compare_design, elbow_requirement
 from tests.reference.geometry import GeometryReference
@@ -122,12 +122,6 @@ def test_least_norm_moves_only_along_the_facts():
     x, rank = least_norm(np.array([[1.0, 2.0, 0.0]]), np.array([5.0]), prior, spread)
     np.testing.assert_allclose(x, [2.0, 1.5, 5.0], rtol=1e-12)
     assert rank == 1
-
-
-def test_bisect():
-    found = root_between(lambda x: x**3 - 2.0, 0.0, 2.0)
-    assert found == pytest.approx(2.0 ** (1.0 / 3.0), rel=1e-15)
-    assert root_between(lambda x: x + 1.0, 0.0, 1.0) is None
 
 
 def test_design_comparison():

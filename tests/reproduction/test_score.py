@@ -10,11 +10,10 @@ import pytest
 
 from reproduction import CHAPTERS, chapter4, chapter5, chapter5_comparison, tracking
 from reproduction.chapter4_statements import on_stop, restless, statements
-from reproduction.comparison import BASES, KINDS, judge
+from reproduction.comparison import BASES, KINDS
 from reproduction.lift import GAINS, Map
 from tests.reproduction.pages import facts, page_of
 from tests.reproduction.test_chapter4 import made, verdicts
-from tests.tables import rows_of
 
 #: Sentences that state several numbers or orders, each of which is a row.
 SEVERAL = (
@@ -33,23 +32,7 @@ def stored(chapter):
     return [row for row in facts(chapter) if not row["apart"]]
 
 
-def found(chapter, fact):
-    rows = [row for row in stored(chapter) if re.fullmatch(fact, row["fact"])]
-    assert rows, fact
-    return rows
-
-
 # ------------------------------------------------------------------------ what is stored
-
-
-@pytest.mark.parametrize(("chapter", "fact", "kind"), rows_of(__file__, "changed"))
-def test_row_that_changed_is_what_it_is_now(chapter, fact, kind):
-    assert {row["kind"] for row in found(chapter, fact)} <= set(kind.split("|"))
-
-
-@pytest.mark.parametrize(("chapter", "fact", "low", "high"), rows_of(__file__, "numbers"))
-def test_row_that_changed_has_its_number(chapter, fact, low, high):
-    assert all(float(low) < float(row["ours"]) < float(high) for row in found(chapter, fact))
 
 
 @pytest.mark.parametrize("chapter", CHAPTERS.values())
@@ -77,38 +60,7 @@ def test_one_sentence_is_one_row(chapter):
     assert [where for where in again if not any(text in where for text in SEVERAL)] == []
 
 
-def test_rows_of_chapter_4_say_what_does_not_come_to_rest_and_so_does_its_page():
-    rows = found("chapter4", r"FF\+PID: .*")
-    assert len(rows) == 3
-    assert all("too slow to settle): FF+PID" in row["note"] for row in rows)
-    text = page_of("chapter4")
-    assert "FF+PID 22.7 (23 kg), 43.3 (34 kg)" in text
-    assert "kP of the PID may grow by" in text
-
-
-def test_pages_of_chapters_5_and_6_have_their_margins():
-    assert "| 0 lb | 1.48 | 0.98 |" in page_of("chapter5")
-    line = r"^\| ([^|]+) \| \d+ \| (\d\.\d\d) \| ([\d.]+) \|"
-    runs = re.findall(line, page_of("chapter6"), re.MULTILINE)
-    assert len(runs) == 29
-    assert all(float(inner) > 1.9 for _, inner, _ in runs)
-    below = {name for name, _, whole in runs if float(whole) < 1.0}
-    assert below == {"PI without the rate, a quarter as fast"}
-
-
 # ----------------------------------------------------------------------- how it is judged
-
-
-def test_kind_is_the_verdict_with_what_it_rests_on():
-    assert judge("g", "f", "1", 1.0, 1.0).kind == "agrees on its own"
-    assert judge("g", "f", "1", 1.0, 1.0, basis="construction").kind == "agrees by construction"
-    sign = judge("g", "f", "1", 1.0, 2.0, relation="above", basis="sign")
-    assert sign.kind == "agrees in sign only"
-    other = judge("g", "f", "1", 1.0, 0.5, relation="above", basis="sign", note="n")
-    assert (other.kind, other.remark) == ("differs", "reason not known; n")
-    known = judge("g", "f", "1", 1.0, 0.5, relation="above", reason="because", note="n")
-    assert known.remark == "because; n"
-    assert judge("g", "f", "1", 1.0, 0.5, apart="a trial").remark == ""
 
 
 def test_overshoot_onto_the_stop_decides_nothing():

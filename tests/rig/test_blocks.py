@@ -11,7 +11,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import pamrs
@@ -119,33 +118,6 @@ def test_packaged_joints_stay_within_what_their_muscles_can_do() -> None:
 
 
 # ------------------------------------------------------------------------ shape of a model
-
-
-def test_a_chain_keeps_its_shape_and_its_names() -> None:
-    rig = rigs.shoulder()
-    model = rig.model
-    assert list(model) == ["name", "limits", *BLOCKS, "ports", "effects", "model_error"]
-    assert model["valve"] == {
-        "flow": "orifice",
-        "discharge_area_max": 8.4e-6,
-        "null_voltage": 5.0,
-        "half_range": 5.0,
-        "spool": "ideal",
-        "opening": [0.0, 0.25, 0.5, 0.75, 1.0],
-        "fraction": [0.0, 0.2, 0.5, 0.8, 1.0],
-    }
-    assert model["supply"] == {
-        "kind": "tank",
-        "volume": 0.015,
-        "initial_pressure": 13.8e5,
-        "pressure_zero": 0.0,
-    }
-    assert model["ports"] == {}
-    assert all(model[block] is None for block in ("line", "transmission", "link", "load"))
-    assert "valve.half_range" in rig.parameters
-    assert rig.parameters["chamber.initial_pressure"].value == 0.0
-    assert "[valve]\n" in rig.to_toml_text()
-    assert "from" not in rig.to_toml_text()
 
 
 def test_tables_of_blocks_with_and_without_names() -> None:
@@ -573,17 +545,6 @@ def test_valves_that_never_act_are_told(
     assert [line for line in out.splitlines() if line.startswith("warning: ")] == [
         f"warning: {text}" for text in rig.cautions
     ]
-
-
-def test_a_delay_as_long_as_the_period_opens_at_a_whole_duty_alone() -> None:
-    rig = pulsed('opening_delay = { value = 15, unit = "ms" }')
-    ends = []
-    for duty in (0.99, 1.0):
-        command = np.full(101, 24.0 * duty)
-        command[:20] = 0.0
-        ends.append(pamrs.simulate(rig, command, sample_time=0.005)["muscle_pressure"][-1])
-    assert ends[0] == 0.0
-    assert ends[1] > 5e5
 
 
 @pytest.mark.parametrize(("value", "shown"), [("257", "257"), ("-1", "-1"), ("2.5", "2.5")])

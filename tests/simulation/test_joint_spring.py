@@ -64,14 +64,6 @@ def test_energy_of_weight_and_spring_is_kept() -> None:
     np.testing.assert_allclose(energy, energy[0], rtol=0.0, atol=1e-8 * np.ptp(rate**2))
 
 
-def test_at_rest_it_carries_the_weight() -> None:
-    arm = {"gravity": 9.80665, "first_moment": 1.2, "viscous": 4.0}
-    run = pamrs.simulate(free_arm(arm=arm, **SPRING), duration=10.0, sample_time=0.01)
-    angle = run["joint_angle"][-1]
-    assert STIFFNESS * (REST - angle) == pytest.approx(9.80665 * 1.2 * math.sin(angle), rel=1e-6)
-    assert 0.1 < angle < REST
-
-
 @pytest.mark.parametrize(
     ("change", "why"),
     [

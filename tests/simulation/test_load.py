@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.fit import ForceMap, fit_muscle
 from pamrs.report.motion import write_channels
 from pamrs.rig import parse_rig
 from tests.simulation.refusals import refused
@@ -51,29 +50,6 @@ def test_a_mass_can_be_raised_by_a_pressure_that_is_given() -> None:
     run = pamrs.simulate(rig, sample_time=0.01, pressure=pressure, initial={"length": 0.262})
     np.testing.assert_allclose(run["muscle_pressure"], pressure, rtol=1e-12)
     assert run["length"][-1] < run["length"][200] - 0.01
-
-
-def test_steps_on_the_frame_are_the_run() -> None:
-    rig = pamrs.rigs.bench(muscle())
-    length = np.linspace(0.276, 0.25, 30)
-    whole = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(30, 2e5))
-    start = {"muscle_pressure": 2e5, "length": float(length[0])}
-    one = pamrs.Simulator(rig, sample_time=0.01, initial=start)
-    for row in range(1, 30):
-        sample = one.step(length=float(length[row]), pressure=2e5)
-        assert sample["muscle_force"] == whole["muscle_force"][row]
-
-
-def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
-    real = muscle().replace(friction_coefficient=0.0)
-    p, e = (grid.ravel() for grid in np.meshgrid([2e5, 4e5, 6e5], np.linspace(0.0, 0.25, 8)))
-    measured = {"length": 0.276 * (1.0 - e), "pressure": p, "force": real.force(p, e)}
-    data = ForceMap.from_arrays(**measured, rest_length=0.276)
-    rig = parse_rig(fit_muscle(data, real, order=2).to_rig().to_toml_text())
-    length = np.linspace(0.276, 0.21, 50)
-    run = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(50, 3e5))
-    pull = np.maximum(real.force(3e5, 1.0 - length / 0.276), 0.0)  # it does not push
-    np.testing.assert_allclose(run["muscle_force"], pull, rtol=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -65,17 +65,6 @@ def test_what_alpha_makes_up_is_said_and_by_what(segments: int) -> None:
     assert "energy_balance" not in str(run.balance)
 
 
-def test_a_tube_between_chambers_makes_up_what_its_segments_do() -> None:
-    text = HEAD + chamber("a", 0.1, 5.0) + chamber("b", 0.3, 0.0) + hose(8.0, 12)
-    run = pamrs.simulate(parse_rig(text), sample_time=0.002, duration=0.2)
-    gained = sum(float(mass[-1] - mass[0]) for mass in run.under("segment_mass").values())
-    assert run.balance.created == pytest.approx(0.4 * gained, rel=1e-9)
-    assert run.balance.laws == ("line",)
-    both = pamrs.simulate(pamrs.rigs.named("long_tube"), sample_time=0.002, duration=0.2).balance
-    assert both.laws == ("chamber.left", "chamber.right", "line")
-    assert 'gas = "energy_balance" of a chamber is; and by line.alpha' in str(both)
-
-
 def test_a_new_rig_has_an_energy_balance_in_its_chambers_and_its_own_alpha_along_the_tube() -> None:
     rig = parse_rig(pamrs.rigs.template("long_tube"))
     assert {table["gas"] for table in rig.tables("chamber").values()} == {"energy_balance"}

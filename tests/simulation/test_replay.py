@@ -56,16 +56,6 @@ def test_a_recording_of_named_blocks_is_replayed(tmp_path: Path) -> None:
         replay(rig, pamrs.load_recording(some))
 
 
-def test_a_measured_pressure_lifts_the_mass_where_nothing_feeds_the_muscle(tmp_path: Path) -> None:
-    whole = pamrs.rigs.named("hanging_mass")
-    run = pamrs.simulate(whole, wave(300) + 0.2, sample_time=0.01)
-    tables = [t for t in whole.to_toml_text().split("\n[") if not t.startswith(("supply", "valve"))]
-    recording = pamrs.load_recording(write(tmp_path / "run.csv", run, "muscle_pressure", "length"))
-    again = replay(parse_rig("\n[".join(tables)), recording)
-    assert differences(again, recording)["length"] < 1e-4
-    assert np.ptp(run["length"]) > 0.01
-
-
 @pytest.mark.parametrize("alike", [True, False])
 def test_a_gas_may_begin_warm_or_cold(alike: bool) -> None:
     """The second half of a run of two gases, from their pressures and temperatures alone."""
@@ -152,25 +142,6 @@ def test_wrong_steps_are_named(
     code, _, err = command(capsys, "simulate", "two_joint_arm", *words, "--output", out)
     assert code == 2
     assert message in err.splitlines()[-1]
-
-
-def test_a_controller_is_asked_at_its_own_rate() -> None:
-    one = pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.001)
-    asked = []
-
-    def update(sample: dict[str, float]) -> float:
-        asked.append(sample["time"])
-        return 5.0 + 2.0 * (0.8 - sample["joint_angle"])
-
-    run = one.control(update, 0.5, period=0.02)
-    np.testing.assert_allclose(asked, np.arange(25) * 0.02, atol=1e-12)
-    held = run["valve_command"]
-    assert all(np.unique(held[20 * k : 20 * (k + 1)]).size == 1 for k in range(25))
-    plain = pamrs.simulate(pamrs.rigs.shoulder(), held, sample_time=0.001)
-    np.testing.assert_array_equal(plain["joint_angle"], run["joint_angle"])
-    for name, value in (("period", 0.0015), ("duration", -1.0), ("period", 0.0)):
-        with pytest.raises(pamrs.ParameterError, match=f"{name} = "):
-            one.control(update, **{"duration": 0.1, "period": 0.01, name: value})
 
 
 PAIR = ("valve_command.flexor", "muscle_pressure.flexor", "joint_angle.elbow")

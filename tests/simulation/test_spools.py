@@ -76,24 +76,6 @@ def test_a_run_restarts_bit_for_bit(
 
 
 @EACH
-def test_many_are_what_single_ones_are(
-    rig: pamrs.Rig, volts: dict[str, np.ndarray], sample_time: float
-) -> None:
-    name = "valve.natural_frequency" if "" in volts else "valve.fill.opening_delay"
-    values = [0.8 * rig.parameter(name).value, rig.parameter(name).value]
-    rigs = [rig.with_parameters({name: value}) for value in values]
-    batch = pamrs.Batch(rigs, sample_time=sample_time)
-    assert not batch.side_by_side.any()
-    single = [pamrs.simulate(r, volts, sample_time=sample_time)["muscle_pressure"] for r in rigs]
-    rows = []
-    for k in range(60):
-        row = {n: float(v[k]) for n, v in volts.items()}
-        rows.append(batch.step(row.get("", row))["muscle_pressure"])
-    np.testing.assert_array_equal(np.array(rows).T, [run[1:] for run in single])
-    assert float(np.abs(single[0] - single[1]).max()) > 1e2
-
-
-@EACH
 def test_sensitivities_of_the_cut_chain_are_those_of_differences(
     rig: pamrs.Rig, volts: dict[str, np.ndarray], sample_time: float
 ) -> None:

@@ -108,13 +108,6 @@ class FitStatistics:
         return self._problem.free
 
     @property
-    def moduli_names(self) -> tuple[str, ...]:
-        """What the columns of :meth:`moduli` are: ``E1``..., ``c10`` and ``c01``,
-        ``bladder_modulus``, or none.
-        """
-        return self._estimate.design.base
-
-    @property
     def moduli_kind(self) -> str:
         """``"linear"`` (in pressure) or ``"per_level"``."""
         return self._problem.moduli
