@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         units,
     )
     from pamrs.design import sizing
-    from pamrs.diagnosis import diagnose
+    from pamrs.diagnosis import diagnose, missing_input
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
     from pamrs.diagnosis.result import Diagnosis, load_result
     from pamrs.diagnosis.settings import DiagnosisSettings
@@ -96,6 +96,7 @@ __all__ = [
     "load_recording",
     "load_result",
     "load_rig",
+    "missing_input",
     "plan_diagnosis",
     "recordings",
     "report",
@@ -111,7 +112,7 @@ __all__ = [
 
 _NAMES: Final = {
     "design": ("sizing",),
-    "diagnosis": ("diagnose",),
+    "diagnosis": ("diagnose", "missing_input"),
     "diagnosis.next_experiment": ("Plan", "plan_diagnosis"),
     "diagnosis.result": ("Diagnosis", "load_result"),
     "diagnosis.settings": ("DiagnosisSettings",),

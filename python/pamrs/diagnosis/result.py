@@ -88,6 +88,12 @@ class Diagnosis(View, Findings):
     fit : FitErrors
         ``channels`` and ``held_out``: {channel: {noise, before, refit, after}} in SI, and
         ``gap_closed``.
+    missing_input : MissingInput or None
+        What the refitted model of the answer's block would need to follow the recordings (a torque,
+        a force, a mass flow, an error of a reading): ``sentence``, ``argument``, ``share``,
+        ``unit``, ``units``, and for each of ``recordings`` ``time``, ``value``, ``std``,
+        ``arguments``, with ``law`` what a named effect takes of it; at most 400 points of each. None
+        where nothing is missing, or it could not be followed.
     next_experiment : NextExperiment
         ``text``, ``excitation``, ``expected_information_bits``, ``pairs`` (what tells each two
         hypotheses that are left open apart: ``between``, ``text``, ``experiment``, ``noises``),
@@ -247,7 +253,8 @@ class Diagnosis(View, Findings):
         from pamrs.report.figures import telling_trace
 
         trace = telling_trace(self)
-        return {} if trace is None else {trace.channel: partial(_draw_trace, trace=trace)}
+        shown = {} if trace is None else {trace.channel: partial(_draw_trace, trace=trace)}
+        return shown if self.missing_input is None else shown | self.missing_input._panels()
 
     def _repr_html_(self) -> str:
         """Short HTML for notebooks, with the recording that shows most."""

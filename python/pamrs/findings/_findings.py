@@ -32,6 +32,7 @@ from pamrs.findings._entries import (
     WrongParameter,
 )
 from pamrs.findings._entry import NOT_WRITTEN
+from pamrs.findings._missing import MissingInput
 from pamrs.findings._trace import ModelFile, Trace
 
 
@@ -81,6 +82,9 @@ class Findings:
         Parameters of the baseline, SI.
     fit : FitErrors
         Error of each channel, and how much of the gap to the noise is closed.
+    missing_input : MissingInput or None
+        What the model of the block that the answer is about would need to follow the recordings;
+        None where nothing is missing, or it could not be followed.
     next_experiment : NextExperiment
         What to record next.
     data : list of RecordingUsed
@@ -132,6 +136,7 @@ class Findings:
     free_run_note: str = ""
     parameters: dict[str, ParameterFound] = field(default_factory=dict)
     fit: FitErrors = field(default_factory=FitErrors)
+    missing_input: MissingInput | None = None
     next_experiment: NextExperiment = field(default_factory=NextExperiment)
     data: list[RecordingUsed] = field(default_factory=list)
     considered: list[Considered] = field(default_factory=list)
