@@ -6,10 +6,11 @@ residual of its own. The baseline is refitted inside its tolerances first; what 
 noise level is located by block and condition, and the effects of the catalogue compete with each
 other and with "unlisted" on held-out recordings.
 
-Public are `diagnose`, `missing_input`, `Diagnosis`, `DiagnosisSettings`, and these packages and modules, each with
-its own list: `settings` (what a user may change), `result` (what is returned), `ready` (what is
-looked at before any fit), and the steps in the order in which they work: `prepare`, `fit`, `noise`,
-`missing`, `screen`, `evidence`, `search`, `model`, `next_experiment`, `explain`.
+Public are `diagnose`, `missing_input`, `Diagnosis`, `DiagnosisSettings`, and these packages and
+modules, each with its own list: `settings` (what a user may change), `result` (what is returned),
+`ready` (what is looked at before any fit), and the steps in the order in which they work:
+`prepare`, `fit`, `noise`, `missing`, `screen`, `evidence`, `search`, `model`, `next_experiment`,
+`explain`.
 """
 
 from __future__ import annotations
@@ -379,7 +380,7 @@ def _missing(
         named=core_rig(models.final) if named else None,
         margin=inner.settings.noise_margin,
     )
-    followed = missing is not None and 0.0 < missing.share and missing.noises_after < MOST_MISSED
+    followed = missing is not None and missing.share > 0.0 and missing.noises_after < MOST_MISSED
     return missing.thinned(_MOST_POINTS) if missing is not None and followed else None
 
 
@@ -402,7 +403,8 @@ def missing_input(
 
     That is a torque at a joint [N m], a force at a load [N], a mass flow into a chamber or tank
     [kg/s]; of what else is measured (a force, a temperature, a line's inlet) the error of the
-    reading. Nothing is refitted: what values of the rig file are off by is in it too.
+    reading. It is positive where it makes what the block predicts larger. Nothing is refitted: what
+    values of the rig file are off by is in it too.
 
     Parameters
     ----------
@@ -459,9 +461,7 @@ def missing_input(
             every = replace(every, blocks=[there[block]])
         noise_level = noise_levels(every, every.core)
         own = worst_block(every, noise_level)
-        found = missing_input_of(
-            own, every.core, roles, noise_level, margin=chosen.noise_margin
-        )
+        found = missing_input_of(own, every.core, roles, noise_level, margin=chosen.noise_margin)
     if found is None:
         raise DiagnosisError(
             f"case {name!r}: block {own.name}: with no input does the model follow a recording; "

@@ -92,8 +92,8 @@ class Diagnosis(View, Findings):
         What the refitted model of the answer's block would need to follow the recordings (a torque,
         a force, a mass flow, an error of a reading): ``sentence``, ``argument``, ``share``,
         ``unit``, ``units``, and for each of ``recordings`` ``time``, ``value``, ``std``,
-        ``arguments``, with ``law`` what a named effect takes of it; at most 400 points of each. None
-        where nothing is missing, or it could not be followed.
+        ``arguments``, with ``law`` what a named effect takes of it; at most 400 points of each.
+        None where nothing is missing, or it could not be followed.
     next_experiment : NextExperiment
         ``text``, ``excitation``, ``expected_information_bits``, ``pairs`` (what tells each two
         hypotheses that are left open apart: ``between``, ``text``, ``experiment``, ``noises``),
@@ -253,7 +253,7 @@ class Diagnosis(View, Findings):
         from pamrs.report.figures import telling_trace
 
         trace = telling_trace(self)
-        shown = {} if trace is None else {trace.channel: partial(_draw_trace, trace=trace)}
+        shown: Panels = {} if trace is None else {trace.channel: partial(_draw_trace, trace=trace)}
         return shown if self.missing_input is None else shown | self.missing_input._panels()
 
     def _repr_html_(self) -> str:

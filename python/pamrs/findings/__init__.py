@@ -5,7 +5,8 @@ diagnosis, so that neither has to know the other to name what lies between them.
 thing, once: the answer that all of it comes to (`Answer`).
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
-`WrongParameter`, `Unexplained`, ...), `MissingInput`, `MissingRecording`, `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
+`WrongParameter`, `Unexplained`, ...), `MissingInput` with `MissingRecording`, and the `shown_unit`
+of what it has; `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
 `Answer` with its `Part` and `Missed`, and what decides it (`case_verdict`, `beyond`, `left_of`,
 `chance_of`, `SETTLED`); `compare_results` of two results, and `Compared`; `to_plain`, by which they
 become JSON, and `fields_from`, which reads it.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -15,7 +16,8 @@ from pamrs.channels import read_in
 from pamrs.findings._entry import OPTIONAL, Entry, to_plain
 
 FloatArray = npt.NDArray[np.float64]
-_POINTS, _TIME_POINTS = 24, 120  # of a mean in a picture, and of one over time
+_POINTS = (24, 120)  # of a curve in a picture, and of one over time
+_LETTERS = 76  # of a line above it
 _LEAST_IN_POINT = 4  # values that make one of them
 
 
@@ -68,16 +70,21 @@ class MissingRecording(Entry):
         def few(values: FloatArray) -> FloatArray:
             return np.array([float(f"{v:.6g}") for v in values[every]])
 
-        law = None if self.law is None else few(self.law)
-        own = {n: few(v) for n, v in self.arguments.items()}
-        curves = {n: few(getattr(self, n)) for n in ("time", "value", "std")}
-        return replace(self, **curves, arguments=own, law=law)
+        return replace(
+            self,
+            time=few(self.time),
+            value=few(self.value),
+            std=few(self.std),
+            arguments={n: few(v) for n, v in self.arguments.items()},
+            law=None if self.law is None else few(self.law),
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MissingInput(View, Entry):
     """The input that a block's model would need to follow the recordings: a torque at a joint, a
-    force at a load, a mass flow into a chamber or tank; elsewhere an error of the reading.
+    force at a load, a mass flow into a chamber or tank; elsewhere an error of the reading. It is
+    positive where it makes what the block predicts larger.
 
     Attributes
     ----------
@@ -90,8 +97,8 @@ class MissingInput(View, Entry):
     argument : str
         What it depends on most: a name of ``units``; empty where no single one explains it.
     explained : float
-        Share of the input's square that a function of that argument tells of stretches that it was
-        not fitted to, and of all its square what lies above zero (0 to 1).
+        Share of the input's square that a function of that argument tells in stretches of time that
+        it was not fitted to (0 to 1).
     share : float
         Share of the block's mismatch above the noise that the input explains (0 to 1).
     noises_before, noises_after : float
@@ -172,27 +179,29 @@ def _draw(found: MissingInput, axes: Any) -> None:
     up = np.concatenate([own.arguments[found.rate] for own in told]) > 0.0
     laws = [own.law for own in told if own.law is not None]
     law = factor * np.concatenate(laws) if len(laws) == len(told) else None
-    for rows, name, colour in ((up, "up", COLOURS[0]), (~up, "down", COLOURS[1])):
+    strokes = [(up, "up stroke", COLOURS[0]), (~up, "down stroke", COLOURS[1])]
+    for rows, _, colour in strokes:
         axes.plot(x[rows], y[rows], ".", color=colour, ms=3.0, alpha=0.4, rasterized=True)
-        there, middle, wide = _means(x[rows], y[rows], std[rows] ** 2, over=argument)
+    if argument == "time":
+        strokes = [(np.ones_like(up), told[0].recording, "#6b7280")]
+    for rows, name, colour in strokes:
+        columns = (x[rows], y[rows], std[rows] ** 2, (y if law is None else law)[rows])
+        there, middle, wide, named = _means(columns, _POINTS[argument == "time"])
         band = 2.0 * np.sqrt(wide)
         axes.fill_between(there, middle - band, middle + band, color=colour, alpha=0.25, lw=0.0)
-        axes.plot(there, middle, color=colour, lw=1.4, label=f"missing, {name} stroke")
+        axes.plot(there, middle, color=colour, lw=1.4, label=name)
         if law is not None:
-            there, middle, _ = _means(x[rows], law[rows], law[rows], over=argument)
-            named = "what is named" if name == "up" else None
-            axes.plot(there, middle, color="black", lw=1.2, ls="--", label=named)
+            last = "what is named" if name == strokes[-1][1] else None
+            axes.plot(there, named, color="black", lw=1.2, ls="--", label=last)
     axes.axhline(0.0, color="#6b7280", lw=0.7)
-    axes.set_title(f"Missing: {found.sentence}", fontsize="medium")
+    axes.set_title(textwrap.fill(f"Missing: {found.sentence}", _LETTERS), fontsize="medium")
     axes.set_xlabel(f"{argument.replace('_', ' ')} [{of}]")
     axes.set_ylabel(f"missing, {found.block.replace('_', ' ')} [{unit}]")
-    axes.legend(fontsize="small", frameon=False, title="band: 2 standard deviations")
+    axes.legend(fontsize="small", frameon=False, title="band: ± 2 std")
 
 
-def _means(*columns: FloatArray, over: str) -> list[FloatArray]:
-    """Means of groups of points along the first column; over time of short ones."""
-    x = columns[0]
-    most = _TIME_POINTS if over == "time" else _POINTS
-    order = np.argsort(x, kind="stable")
-    groups = np.array_split(order, min(most, max(1, x.size // _LEAST_IN_POINT)))
+def _means(columns: Sequence[FloatArray], most: int) -> list[FloatArray]:
+    """Means of so many groups of points at most along the first column."""
+    order = np.argsort(columns[0], kind="stable")
+    groups = np.array_split(order, min(most, max(1, order.size // _LEAST_IN_POINT)))
     return [np.array([float(own[g].mean()) for g in groups if g.size]) for own in columns]

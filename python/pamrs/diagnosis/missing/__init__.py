@@ -1,8 +1,8 @@
 """The missing input: what the model of a block would need to follow the recordings, what it depends
 on, in numbers and in words.
 
-Public: `missing_input_of` (a block and its recordings), `reconstruct` (one recording), `worst_block`
-(which one misses most).
+Public: `missing_input_of` (a block and its recordings), `reconstruct` with `Reconstruction` (one
+recording), `worst_block` (which one misses most).
 """
 
 from __future__ import annotations

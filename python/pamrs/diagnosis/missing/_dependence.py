@@ -195,17 +195,17 @@ def _sentence(found: MissingInput, along: _Along, name: str, fit: Array) -> str:
     if name == found.rate:
         moving = np.abs(rate) > np.median(np.abs(rate))
         against = along.mean(fit * np.sign(rate), moving) < 0.0
-        size = _size(found, along.mean(np.abs(fit), moving))
+        told = _size(found, along.mean(np.abs(fit), moving))
         _, middle, fast = (
             along.mean(np.abs(fit), rows) if rows.any() else 0.0
             for rows in along.thirds(np.abs(rate), every)
         )
         growing = ", growing with the rate" if fast > _FASTER * middle else ""
         if channel_of(found.block) in ("arm", "load"):
-            return f"{size} {'against' if against else 'with'} the motion{growing}"
+            return f"{told} {'against' if against else 'with'} the motion{growing}"
         ways = ("falls", "grows")[:: 1 if against else -1]
         noun = spoken_name(found.position)
-        return f"{size} more while the {noun} {ways[0]}, less while it {ways[1]}{growing}"
+        return f"{told} more while the {noun} {ways[0]}, less while it {ways[1]}{growing}"
     mean, size = along.mean(fit, every), along.mean(np.abs(fit), every)
     sided = abs(mean) > _ONE_SIDED * size
     told = _size(found, size) + (_sense(found, mean) if sided else "")
@@ -233,5 +233,5 @@ def _beside(found: MissingInput, along: _Along, name: str, beside: str) -> str:
     larger = int(sizes[1] > sizes[0])
     ratio = sizes[larger] / max(sizes[1 - larger], 1e-300)
     times = "twice" if 1.75 < ratio < 2.25 else f"{format_number(ratio, 2)} times"
-    there, here = places[larger], places[1 - larger]
-    return f", {times} as large at {_at(found, beside, there)} as at {_at(found, beside, here)}"
+    there, here = (_at(found, beside, place) for place in (places[larger], places[1 - larger]))
+    return f", {times} as large at a {spoken_name(beside)} of {there} as of {here}"

@@ -24,6 +24,7 @@ _FIRST_STEPS = 4  # from nothing with whole windows, before short ones are tried
 _FAR = 3.0  # [noise levels] left in a window whose input was not found
 _ENOUGH = 1.5  # [noise levels squared] left in a window from which on no step is needed
 _ALWAYS = 2  # steps that are made in any case: a small input leaves little
+_HALVINGS = 3  # of an input that takes a model out of its range, before it is left out
 _SHORTER, _LEAST_STEP = 0.35, 0.02  # of a step that left more, and the shortest
 _PORTS = ("arm", "load", "chamber", "supply")  # blocks with a place where an input enters
 
@@ -57,9 +58,15 @@ def has_port(block: Block) -> bool:
     return block.name.partition(".")[0] in _PORTS
 
 
-@dataclass(eq=False)
 class _Windows:
     """The windows of a recording, of some length, with the heights of an input at their knots.
+
+    Parameters
+    ----------
+    block, core, prepared, noise
+        As of :func:`reconstruct`.
+    at : callable
+        The input that they begin with, as a function of time [s].
 
     Attributes
     ----------
@@ -77,53 +84,40 @@ class _Windows:
         Residual of each bin and what each knot of its window does to it [noise levels].
     """
 
-    block: Block
-    core: _core.Rig
-    prepared: Prepared
-    noise: float
-    starts: list[int]
-    ends: list[int]
-    spacing: int
-    knots: list[slice]
-    time: Array
-    heights: Array
-    bins: list[NDArray[np.intp]]
-    means: Array
-    response: Array
+    def __init__(
+        self,
+        block: Block,
+        core: _core.Rig,
+        prepared: Prepared,
+        noise: float,
+        at: Callable[[Array], Array],
+    ) -> None:
+        self.block, self.core, self.prepared, self.noise = block, core, prepared, noise
+        self.starts = prepared.starts(block.window, block.drives)
+        self.ends = [*self.starts[1:], prepared.n]
+        lengths = [b - a for a, b in zip(self.starts, self.ends, strict=True)]
+        longest = max(lengths)
+        self.spacing = max(1, round(_HAT / prepared.dt), -(-longest // _MOST_KNOTS))
+        counts = [Input(self.spacing, np.empty(0)).knots(length) for length in lengths]
+        self.knots = [slice(a, b) for a, b in pairwise(np.cumsum([0, *counts]).tolist())]
+        places = [a + self.spacing * np.arange(k) for a, k in zip(self.starts, counts, strict=True)]
+        self.time: Array = prepared.dt * np.concatenate(places).astype(np.float64)
+        self.heights = at(self.time)
+        self.means, counted, self.response = self._begun()
+        first = bins_of(prepared) * np.arange(self.means.size)
+        window = np.searchsorted(self.starts, first, side="right") - 1
+        within = [window == k for k in range(len(lengths))]
+        self.bins = [np.flatnonzero(own & (counted > 0)) for own in within]
 
-    @classmethod
-    def of(
-        cls, block: Block, core: _core.Rig, prepared: Prepared, noise: float, at: Callable[[Array], Array]
-    ) -> _Windows:
-        """Windows of a block with an input that is a function of time."""
-        starts = prepared.starts(block.window, block.drives)
-        ends = [*starts[1:], prepared.n]
-        longest = max(b - a for a, b in zip(starts, ends, strict=True))
-        spacing = max(1, round(_HAT / prepared.dt), -(-longest // _MOST_KNOTS))
-        counts = [Input(spacing, np.empty(0)).knots(b - a) for a, b in zip(starts, ends, strict=True)]
-        knots = [slice(a, b) for a, b in pairwise(np.cumsum([0, *counts]).tolist())]
-        places = [a + spacing * np.arange(k) for a, k in zip(starts, counts, strict=True)]
-        time = prepared.dt * np.concatenate(places)
-        none = np.empty(0)
-        found = cls(
-            block, core, prepared, noise, starts, ends, spacing, knots, time, at(time), [], none, none
-        )  # fmt: skip
-        for share in (1.0, 0.5, 0.25, 0.0):
+    def _begun(self) -> tuple[Array, Array, Array]:
+        """The first run, with less of the input where the model leaves its range with all of it."""
+        for _ in range(_HALVINGS):
             try:
-                means, counts_of, response = found.run(share * found.heights)
+                return self.run(self.heights)
             except SimulationError:
-                if not share:
-                    raise
-                continue
-            found.heights = share * found.heights
-            break
-        first = bins_of(prepared) * np.arange(means.size)
-        window = np.searchsorted(starts, first, side="right") - 1
-        found.bins = [
-            np.flatnonzero((window == k) & (counts_of > 0)) for k in range(len(starts))
-        ]
-        found.means, found.response = means, response
-        return found
+                self.heights = 0.5 * self.heights
+        self.heights = np.zeros_like(self.heights)
+        return self.run(self.heights)
 
     def run(self, heights: Array) -> tuple[Array, Array, Array]:
         """Residual by bin [noise levels], usable samples and response, of some heights."""
@@ -146,7 +140,10 @@ class _Windows:
         which knots these are.
         """
         most = max(own.stop - own.start for own in self.knots)
-        hats, which = np.zeros((found.value.size, most)), np.zeros((found.value.size, most), np.intp)
+        hats, which = (
+            np.zeros((found.value.size, most)),
+            np.zeros((found.value.size, most), np.intp),
+        )
         for a, b, own in zip(self.starts, self.ends, self.knots, strict=True):
             count = own.stop - own.start
             place = np.arange(b - a)[:, None] / self.spacing
@@ -193,7 +190,7 @@ class _Windows:
                 return
             wanted, _ = self.most_probable()
             tried = self.heights.copy()
-            for k in np.flatnonzero(todo):
+            for k in np.flatnonzero(todo).tolist():
                 own = self.knots[k]
                 tried[own] += length[k] * (wanted[own] - tried[own])
             try:
@@ -203,7 +200,7 @@ class _Windows:
                 continue
             better = todo & (self.left(means) < before)
             length = np.where(todo & ~better, _SHORTER * length, np.minimum(1.0, 2.0 * length))
-            for k in np.flatnonzero(better):
+            for k in np.flatnonzero(better).tolist():
                 self.take(k, tried, means, response)
 
     def take(self, k: int, heights: Array, means: Array, response: Array) -> None:
@@ -260,7 +257,7 @@ def reconstruct(
     likelihood (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, sections 2.2
     and 5.4).
     """
-    windows = _Windows.of(block, core, prepared, noise, _nothing)
+    windows = _Windows(block, core, prepared, noise, _nothing)
     first = [windows.means[i] for i in windows.bins]
     windows.improve(_FIRST_STEPS)
     if (windows.left(windows.means) > _FAR**2).any() and has_port(block):
@@ -296,9 +293,9 @@ def _from_short(windows: _Windows) -> None:
     grown = windows
     for share, steps in _HORIZONS:
         own = replace(block, window=block.window if share == 1.0 else share * whole)
-        grown = _Windows.of(own, windows.core, prepared, windows.noise, at)
+        grown = _Windows(own, windows.core, prepared, windows.noise, at)
         grown.improve(steps)
         at = _interpolated(grown.time, grown.heights)
     better = grown.left(grown.means) < windows.left(windows.means)
-    for k in np.flatnonzero(better):
+    for k in np.flatnonzero(better).tolist():
         windows.take(k, grown.heights, grown.means, grown.response)

@@ -90,17 +90,19 @@ def missing_input_of(
             found = _followed(block, core, prepared, noise)
             if found is None:
                 continue
+            # a force shortens the muscle, and its length is what is measured
+            sign = -1.0 if channel_of(block.name) == "load" else 1.0
             law = None
             rest = None if named is None else _followed(block, named, prepared, noise)
             if rest is not None and rest.time.size:
-                law = found.value - np.interp(found.time, rest.time, rest.value)
+                law = sign * (found.value - np.interp(found.time, rest.time, rest.value))
             parts.append(found)
             told.append(
                 MissingRecording(
                     name,
                     role,
                     found.time,
-                    found.value,
+                    sign * found.value,
                     found.std,
                     _arguments(block, prepared, found.time),
                     math.sqrt(found.before),
