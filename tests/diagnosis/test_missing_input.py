@@ -1,5 +1,5 @@
-"""The missing input of a block: known torques, flows and readings are found again, in numbers and in
-words, and of a healthy arm nothing is.
+"""The missing input of a block: known torques, flows and readings are found in numbers and words,
+and of a healthy arm nothing is.
 """
 
 from __future__ import annotations
