@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         RigError,
         SimulationError,
     )
+    from pamrs.findings import MissingInput
     from pamrs.recordings import Case, Issue, Recording, load_case, load_recording
     from pamrs.rig import Joint, Muscle, Parameter, Rig, load_rig
     from pamrs.simulation import (
@@ -69,6 +70,7 @@ __all__ = [
     "FitError",
     "Issue",
     "Joint",
+    "MissingInput",
     "Muscle",
     "PamrsError",
     "Parameter",
@@ -116,6 +118,7 @@ _NAMES: Final = {
     "diagnosis.next_experiment": ("Plan", "plan_diagnosis"),
     "diagnosis.result": ("Diagnosis", "load_result"),
     "diagnosis.settings": ("DiagnosisSettings",),
+    "findings": ("MissingInput",),
     "errors": tuple(name for name in __all__ if name.endswith("Error")),
     "recordings": ("Case", "Issue", "Recording", "load_case", "load_recording"),
     "rig": ("Joint", "Muscle", "Parameter", "Rig", "load_rig"),

@@ -130,7 +130,7 @@ class MissingInput(View, Entry):
         return f"MissingInput({self.block!r}: {self.sentence})"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what JSON can hold: lists in the place of arrays, null for no number."""
+        """Return it as JSON has it: a list for each array, null for no number."""
         found: dict[str, Any] = to_plain(self)
         return found
 
