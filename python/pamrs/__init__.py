@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         units,
     )
     from pamrs.design import sizing
-    from pamrs.diagnosis import diagnose
+    from pamrs.diagnosis import diagnose, missing_input
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
     from pamrs.diagnosis.result import Diagnosis, load_result
     from pamrs.diagnosis.settings import DiagnosisSettings
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         RigError,
         SimulationError,
     )
+    from pamrs.findings import MissingInput
     from pamrs.recordings import Case, Issue, Recording, load_case, load_recording
     from pamrs.rig import Joint, Muscle, Parameter, Rig, load_rig
     from pamrs.simulation import (
@@ -69,6 +70,7 @@ __all__ = [
     "FitError",
     "Issue",
     "Joint",
+    "MissingInput",
     "Muscle",
     "PamrsError",
     "Parameter",
@@ -96,6 +98,7 @@ __all__ = [
     "load_recording",
     "load_result",
     "load_rig",
+    "missing_input",
     "plan_diagnosis",
     "recordings",
     "report",
@@ -111,10 +114,11 @@ __all__ = [
 
 _NAMES: Final = {
     "design": ("sizing",),
-    "diagnosis": ("diagnose",),
+    "diagnosis": ("diagnose", "missing_input"),
     "diagnosis.next_experiment": ("Plan", "plan_diagnosis"),
     "diagnosis.result": ("Diagnosis", "load_result"),
     "diagnosis.settings": ("DiagnosisSettings",),
+    "findings": ("MissingInput",),
     "errors": tuple(name for name in __all__ if name.endswith("Error")),
     "recordings": ("Case", "Issue", "Recording", "load_case", "load_recording"),
     "rig": ("Joint", "Muscle", "Parameter", "Rig", "load_rig"),

@@ -259,8 +259,11 @@ def test_a_wrong_value_that_is_not_determined_is_no_name_in_noise(
     name = "chamber.dead_volume"
     problem, own = leak_group(3e-9)
     base = own.candidates[0]
-    moved = replace(base.fit, moved=base.fit.moved | {name: 5.0})
-    tolerance = moved.scales[name]
+    tolerance = base.fit.scales[name]
+    far = base.fit.known[name].value + 5.0 * tolerance
+    moved = replace(
+        base.fit, moved=base.fit.moved | {name: 5.0}, values=base.fit.values | {name: far}
+    )
     monkeypatch.setattr(
         "pamrs.diagnosis.evidence._determined.spread_over_pieces",
         lambda problem, found: {name: std * tolerance},

@@ -20,7 +20,6 @@ LAYERS = (
     ("units", "channels"),
     ("declared", "_checks"),
     (
-        "findings",
         "_arrays",
         "_files",
         "_losses",
@@ -30,6 +29,7 @@ LAYERS = (
         "_views",
         "_writing",
     ),
+    ("findings",),
     ("effects",),
     ("rig",),
     ("recordings", "rigs"),
@@ -43,8 +43,8 @@ LAYERS = (
     ("cli",),
 )
 #: The same inside the diagnosis: its steps, then the result, what is said of it, and who runs it.
-STEPS = ("settings", "prepare", "fit", "noise", "screen", "evidence", "search", "model")
-STEPS_OF_A_DIAGNOSIS = (*STEPS, "ready", "next_experiment", "result", "explain", "")
+STEPS = ("settings", "prepare", "fit", "noise", "missing", "screen", "evidence", "search", "model")
+STEPS_OF_A_DIAGNOSIS = (*STEPS, "ready", "next_experiment", "result", "laws", "explain", "")
 #: Names that a module may take from the root package, which loads all others on first use.
 FROM_ROOT = {"_core", "__version__"}
 

@@ -19,28 +19,28 @@ ROOT = Path(__file__).parents[2]
 
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
-    ".": 1139,
+    ".": 1140,
     "cli": 1380,
     "control": 4744,
     "design": 548,
-    "diagnosis": 10247,
+    "diagnosis": 10827,
     "effects": 409,
     "experiments": 1068,
-    "findings": 787,
+    "findings": 915,
     "fit": 3065,
     "library": 71,
     "recordings": 4903,
-    "report": 2093,
-    "rig": 2184,
+    "report": 2123,
+    "rig": 2265,
     "rigs": 139,
     "simulation": 1110,
     "studio": 681,
     "sweeps": 830,
 }
 #: The same of what is not the package.
-ASIDE = {"tests": 29154, "trial": 5358, "reproduction": 4960}
+ASIDE = {"tests": 29343, "trial": 5358, "reproduction": 4960}
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35398
+MOST = 36218
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

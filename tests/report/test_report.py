@@ -17,6 +17,7 @@ pytest.importorskip("matplotlib")
 pytest.importorskip("jinja2")
 
 from pamrs._views import MAX_POINTS, decimate
+from pamrs.diagnosis import Diagnosis
 from pamrs.findings import (
     BudgetTerm,
     ChannelError,
@@ -24,6 +25,9 @@ from pamrs.findings import (
     EffectParameterFound,
     FreeRun,
     FreeRunError,
+    MissingInput,
+    MissingRecording,
+    fields_from,
 )
 from pamrs.report import figures, render_html, story
 from pamrs.report import text as words
@@ -90,6 +94,46 @@ def test_page_tells_the_story(page: str) -> None:
     ):
         assert part in page, part
     assert page.count('<figure class="curves">') == page.count("application/json") == 3
+
+
+def lacking() -> Diagnosis:
+    """The made-up diagnosis with a missing input that has two strokes."""
+    time = np.linspace(0.0, 9.0, 300)
+    rate = np.cos(time)
+    value = -0.4 * np.sign(rate)
+    along = {"joint_angle": np.sin(time), "joint_rate": rate}
+    sizes = (time, value, 0.1 + 0.0 * time, along, 9.0, 1.0, 0.9 * value)
+    missing = MissingInput(
+        block="arm",
+        unit="N m",
+        sentence="0.4 N m against the motion <really>",
+        argument="joint_rate",
+        explained=0.9,
+        share=0.99,
+        noises_before=9.0,
+        noises_after=1.0,
+        position="joint_angle",
+        rate="joint_rate",
+        units={"time": "s", "joint_angle": "rad", "joint_rate": "rad/s"},
+        recordings=[MissingRecording("random", "held_out", *sizes)],
+    )
+    return replace(synthetic.diagnosis(), missing_input=missing)
+
+
+def test_the_first_screen_has_the_missing_input(page: str) -> None:
+    found = lacking()
+    html = render_html(found)
+    first = html.partition("<details><summary>The verdict in full")[0]
+    assert "lacks: 0.4 N m against the motion &lt;really&gt;</h2>" in first
+    for part in ("joint rate [deg/s]", "missing, arm [N m]", "up stroke", "what is named"):
+        assert part in first.partition("lacks: ")[2], part
+        assert part not in page
+    ids = re.findall(r'\bid="([^"]+)"', html)
+    assert len(ids) == len(set(ids))
+    titles = [axes.get_title() for axes in found.plot()]
+    assert titles[-1].startswith("Missing: 0.4 N m")
+    read = fields_from(Diagnosis, json.loads(found.to_json()))["missing_input"]
+    assert read.to_dict() == found.missing_input.to_dict()
 
 
 def visible(html: str) -> list[str]:

@@ -6,10 +6,11 @@ residual of its own. The baseline is refitted inside its tolerances first; what 
 noise level is located by block and condition, and the effects of the catalogue compete with each
 other and with "unlisted" on held-out recordings.
 
-Public are `diagnose`, `Diagnosis`, `DiagnosisSettings`, and these packages and modules, each with
-its own list: `settings` (what a user may change), `result` (what is returned), `ready` (what is
-looked at before any fit), and the steps in the order in which they work: `prepare`, `fit`, `noise`,
-`screen`, `evidence`, `search`, `model`, `next_experiment`, `explain`.
+Public are `diagnose`, `missing_input`, `Diagnosis`, `DiagnosisSettings`, and these packages and
+modules, each with its own list: `settings` (what a user may change), `result` (what is returned),
+`ready` (what is looked at before any fit), and the steps in the order in which they work:
+`prepare`, `fit`, `noise`, `missing`, `screen`, `evidence`, `search`, `model`, `next_experiment`,
+`explain`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -29,7 +30,8 @@ from pamrs.diagnosis.evidence import BlockGroup
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, Unfollowed, fits, with_offsets
 from pamrs.diagnosis.laws import is_better, promising_laws, under
-from pamrs.diagnosis.model import conclude
+from pamrs.diagnosis.missing import missing_input_of, worst_block
+from pamrs.diagnosis.model import Conclusion, conclude
 from pamrs.diagnosis.next_experiment import next_to_record
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
@@ -56,17 +58,19 @@ from pamrs.diagnosis.search import examine, find_misread, reading_errors
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
-from pamrs.findings import NextExperiment
+from pamrs.findings import MOST_MISSED, Answer, MissingInput, NextExperiment
 from pamrs.recordings import Case, Recording, is_table, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig, regulators_of
 
-__all__ = ["Diagnosis", "DiagnosisSettings", "diagnose"]
+__all__ = ["Diagnosis", "DiagnosisSettings", "diagnose", "missing_input"]
 
 # factor for effects on a joint whose geometry is marked unknown (decision 12)
 _UNKNOWN_GEOMETRY_PROBABILITY = 0.4
 # deviations by which noise may move a regulator's droop before its block is left out
 _REGULATOR_DROOP_SHIFT = 3.0
+# points of a missing input that a result keeps of each recording
+_MOST_POINTS = 400
 
 
 #: Shares of a diagnosis at which its blocks begin to be judged, and are.
@@ -214,9 +218,7 @@ def diagnose(
     began = time.perf_counter()
     say = Steps(progress, within=_JUDGED)
     say("reading the case", 0.0)
-    case = _case_of(case, data, allow_outside=allow_outside)
-    if rig is not None:
-        case = case.with_rig(rig) if isinstance(rig, Rig) else case.with_rig(load_rig(rig), rig)
+    case = _case_of(case, data, rig, allow_outside=allow_outside)
     chosen = DiagnosisSettings() if settings is None else settings
     ready = readied(case, chosen)
     case = ready.case
@@ -285,8 +287,16 @@ def _answer(
     return replace(diagnosis, warnings=warnings, data=data)
 
 
-def _case_of(case: Any, data: Any, *, allow_outside: bool) -> Case:
-    """The case that the caller means."""
+def _case_of(case: Any, data: Any, rig: Any, *, allow_outside: bool) -> Case:
+    """The case that the caller means, with the model to begin from."""
+    found = _recorded(case, data, allow_outside=allow_outside)
+    if rig is None:
+        return found
+    return found.with_rig(rig) if isinstance(rig, Rig) else found.with_rig(load_rig(rig), rig)
+
+
+def _recorded(case: Any, data: Any, *, allow_outside: bool) -> Case:
+    """The case that the caller means, with its own model."""
     if data is not None:
         own = case if isinstance(case, (Rig, Case)) else load_rig(case)
         several = isinstance(data, Mapping) and data and all(map(is_table, data.values()))
@@ -339,8 +349,13 @@ def _physics(
         ),
         NextExperiment(""),
     )
+    missing = inner.losses.part(
+        "the missing input", lambda: _missing(diagnosis.answer, found, inner, outer)
+    )
     warnings = [*slack, *diagnosis.warnings]
-    diagnosis = replace(diagnosis, next_experiment=proposal, warnings=warnings)
+    diagnosis = replace(
+        diagnosis, missing_input=missing, next_experiment=proposal, warnings=warnings
+    )
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         told = (
@@ -365,10 +380,119 @@ def _under_best_law(
 
     best, quiet = stated, Steps(None, within=_JUDGED)
     for choice in promising_laws(case.rig, inner, stated, lambda rig: problems(rig)[0]):
-        other, _, _ = _physics(case.with_rig(choice.rig), *problems(choice.rig), quiet)
-        if is_better(other, best):
-            best = under(choice, other, stated)
+        with suppress(PamrsError):  # a rig that these recordings cannot be of
+            other, _, _ = _physics(case.with_rig(choice.rig), *problems(choice.rig), quiet)
+            best = under(choice, other, stated) if is_better(other, best) else best
     return best
+
+
+def _missing(
+    answer: Answer, found: Conclusion, inner: Problem, outer: Problem
+) -> MissingInput | None:
+    """The missing input of the block that the answer is about, as the refitted baseline leaves it,
+    and what the names take of it; None where it is no more than noise, or was not followed.
+    """
+    block = next((b for b in inner.blocks if b.name == answer.block), None)
+    if block is None:
+        return None
+    models = found.models
+    named = models.added and models.events is None and answer.verdict == "effects"
+    missing = missing_input_of(
+        block,
+        core_rig(models.baseline),
+        _by_role(inner, outer),
+        found.noise_level,
+        named=core_rig(models.final) if named else None,
+        margin=inner.settings.noise_margin,
+    )
+    followed = missing is not None and missing.share > 0.0 and missing.noises_after < MOST_MISSED
+    return missing.thinned(_MOST_POINTS) if missing is not None and followed else None
+
+
+def _by_role(inner: Problem, outer: Problem) -> dict[str, list[Prepared]]:
+    """Recordings by their role."""
+    held = {} if outer is inner else {"held_out": outer.recordings}
+    return {"fit": inner.recordings, **held}
+
+
+def missing_input(
+    case: Case | Rig | str | os.PathLike[str],
+    recordings: Any = None,
+    *,
+    block: str | None = None,
+    rig: Rig | str | os.PathLike[str] | None = None,
+    allow_outside: bool = False,
+    settings: DiagnosisSettings | None = None,
+) -> MissingInput:
+    """Find what the model of a block would need to follow the recordings, without a diagnosis.
+
+    That is a torque at a joint [N m], a force at a load [N], a mass flow into a chamber or tank
+    [kg/s]; of what else is measured (a force, a temperature, a line's inlet) the error of the
+    reading. It is positive where it makes what the block predicts larger. Nothing is refitted: what
+    values of the rig file are off by is in it too.
+
+    Parameters
+    ----------
+    case, recordings, rig, allow_outside
+        As `case`, `data`, `rig` and `allow_outside` of :func:`diagnose`.
+    block : str, optional
+        The block: ``arm``, ``arm.elbow``, ``load``, ``chamber.flexor``, ``supply``, ...; by default
+        the one that its model misses by most noise levels.
+    settings : DiagnosisSettings, optional
+        How recordings are made ready and noise is estimated; the defaults of a diagnosis.
+
+    Returns
+    -------
+    MissingInput
+        ``sentence``, ``argument`` and, for each of ``recordings``, arrays (n,): ``time`` [s],
+        ``value`` and ``std`` in ``unit``, ``arguments`` by name in ``units`` (SI); ``plot()``,
+        ``to_dict()``.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such block among those that the recordings surround.
+    DiagnosisError
+        If the recordings cannot be used, or the model follows none of them.
+    CaseError, RigError
+        As :func:`diagnose`.
+
+    Notes
+    -----
+    Heights of a function that is linear between knots, found by Gauss-Newton window by window, with
+    the prior of an Ornstein-Uhlenbeck process whose size is the likeliest one (Rasmussen &
+    Williams, Gaussian Processes for Machine Learning, 2006, sections 2.2 and 5.4).
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> pamrs.missing_input("my_case").sentence  # doctest: +SKIP
+    '0.98 N m against the motion'
+    """
+    chosen = DiagnosisSettings() if settings is None else settings
+    ready = readied(_case_of(case, recordings, rig, allow_outside=allow_outside), chosen)
+    name = ready.case.name
+    shortened, _ = averaged_to_need(ready.case.recordings, ready.blocks, name, chosen)
+    with _in_range(name):
+        inner, outer, _, _ = _problems(replace(ready.case, recordings=shortened), chosen, ())
+        inner, outer, _ = _on_time(inner, outer, ready.case.rig)
+        roles = _by_role(inner, outer)
+        every = replace(inner, recordings=[p for part in roles.values() for p in part])
+        if block is not None:
+            there = {b.name: b for b in inner.blocks}
+            if block not in there:
+                told = meant(str(block), there)
+                raise ParameterError(f"block = {block!r} is not allowed; {told}")
+            every = replace(every, blocks=[there[block]])
+        noise_level = noise_levels(every, every.core)
+        own = worst_block(every, noise_level)
+        found = missing_input_of(own, every.core, roles, noise_level, margin=chosen.noise_margin)
+    if found is None:
+        raise DiagnosisError(
+            f"case {name!r}: block {own.name}: with no input does the model follow a recording; "
+            "check the rig's geometry and the recordings' units and columns"
+        )
+    return found
 
 
 def _judged_only(

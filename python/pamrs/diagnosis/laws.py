@@ -6,12 +6,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from pamrs.diagnosis.evidence import without_autocorrelation
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import refitted
+from pamrs.errors import PamrsError
 from pamrs.findings import ChannelError, FreeRun, OtherLaw, Trace
 from pamrs.rig import OtherChoice, Rig, other_choices
 
@@ -43,8 +45,9 @@ def promising_laws(
         names = [b.name for b in own]
         stated = _missed(rig, problem, names)
         for choice in other_choices(rig, ("muscle",) if mechanical else ("chamber", "valve")):
-            if _missed(choice.rig, prepared(choice.rig), names) < _BETTER * stated:
-                yield choice
+            with suppress(PamrsError):  # a rig that these recordings cannot be of
+                if _missed(choice.rig, prepared(choice.rig), names) < _BETTER * stated:
+                    yield choice
 
 
 def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:

@@ -65,9 +65,9 @@ class Diagnosis(View, Findings):
         Channels that a sensor or logger spoiled, masked or left out, and said first: ``channel``,
         ``kind``, ``text``.
     laws : list of OtherLaw
-        Laws that the recordings follow in the place of those of the rig file, and under which all
+        Laws that the recordings follow instead of those of the rig file, and under which all
         of the rest is judged: ``name``, ``stated``, ``other``, ``channel``, ``unit``, and errors of
-        the refitted baseline ``before`` and ``after``, beside the ``noise``.
+        the refitted baseline ``before`` and ``after``, and the ``noise``.
     where : Where
         ``block``, ``channel``, ``intervals`` (pairs in s), ``conditions`` (``name``, ``share`` of
         the excess and of the ``time``, ``mean``, ``text``), ``text``; optionally ``recording``, to
@@ -92,6 +92,12 @@ class Diagnosis(View, Findings):
     fit : FitErrors
         ``channels`` and ``held_out``: {channel: {noise, before, refit, after}} in SI, and
         ``gap_closed``.
+    missing_input : MissingInput or None
+        What the refitted model of the answer's block would need to follow the recordings (a torque,
+        a force, a mass flow, an error of a reading): ``sentence``, ``argument``, ``share``,
+        ``unit``, ``units``, and for each of ``recordings`` ``time``, ``value``, ``std``,
+        ``arguments``, with ``law`` what a named effect takes of it; at most 400 points of each.
+        None where nothing is missing, or it could not be followed.
     next_experiment : NextExperiment
         ``text``, ``excitation``, ``expected_information_bits``, ``pairs`` (what tells each two
         hypotheses that are left open apart: ``between``, ``text``, ``experiment``, ``noises``),
@@ -251,7 +257,8 @@ class Diagnosis(View, Findings):
         from pamrs.report.figures import telling_trace
 
         trace = telling_trace(self)
-        return {} if trace is None else {trace.channel: partial(_draw_trace, trace=trace)}
+        shown: Panels = {} if trace is None else {trace.channel: partial(_draw_trace, trace=trace)}
+        return shown if self.missing_input is None else shown | self.missing_input._panels()
 
     def _repr_html_(self) -> str:
         """Short HTML for notebooks, with the recording that shows most."""

@@ -5,7 +5,8 @@ diagnosis, so that neither has to know the other to name what lies between them.
 thing, once: the answer that all of it comes to (`Answer`).
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
-`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
+`WrongParameter`, `Unexplained`, ...), `MissingInput` with `MissingRecording`, and the `shown_unit`
+of what it has; `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
 `Answer` with its `Part` and `Missed`, and what decides it (`case_verdict`, `beyond`, `left_of`,
 `chance_of`, `SETTLED`); `compare_results` of two results, and `Compared`; `to_plain`, by which they
 become JSON, and `fields_from`, which reads it.
@@ -69,6 +70,7 @@ from pamrs.findings._entries import (
 )
 from pamrs.findings._entry import Entry, fields_from, to_plain
 from pamrs.findings._findings import Findings
+from pamrs.findings._missing import MissingInput, MissingRecording, shown_unit
 from pamrs.findings._trace import ModelFile, Trace
 
 __all__ = [
@@ -104,6 +106,8 @@ __all__ = [
     "MismatchStages",
     "Misread",
     "Missed",
+    "MissingInput",
+    "MissingRecording",
     "ModelFile",
     "NextExperiment",
     "OtherLaw",
@@ -126,5 +130,6 @@ __all__ = [
     "compare_results",
     "fields_from",
     "left_of",
+    "shown_unit",
     "to_plain",
 ]

@@ -407,7 +407,7 @@ class Faulty(Entry):
 
 @dataclass(frozen=True, eq=False)
 class OtherLaw(Entry):
-    """A law that the recordings follow in the place of that which the rig file chooses.
+    """A law that the recordings follow instead of that which the rig file chooses.
 
     Attributes
     ----------
@@ -416,8 +416,8 @@ class OtherLaw(Entry):
     channel, unit : str
         The channel that tells most, and its SI unit.
     before, after, noise : float
-        Its error with values refitted inside their tolerances, under the choice of the file and
-        under the other one, and its noise, SI.
+        Its error with values refitted inside their tolerances, under ``stated`` and under
+        ``other``, and its noise, SI.
     """
 
     name: str

@@ -33,6 +33,7 @@ from pamrs.findings._entries import (
     WrongParameter,
 )
 from pamrs.findings._entry import NOT_WRITTEN
+from pamrs.findings._missing import MissingInput
 from pamrs.findings._trace import ModelFile, Trace
 
 
@@ -52,7 +53,7 @@ class Findings:
     faulty : list of Faulty
         Channels that a sensor or logger spoiled: masked or left out, and said first.
     laws : list of OtherLaw
-        Laws that the recordings follow in the place of those of the rig file.
+        Laws that the recordings follow instead of those of the rig file.
     where : Where
         Block, channel, intervals, conditions, and a sentence.
     effects : list of EffectFound
@@ -84,6 +85,9 @@ class Findings:
         Parameters of the baseline, SI.
     fit : FitErrors
         Error of each channel, and how much of the gap to the noise is closed.
+    missing_input : MissingInput or None
+        What the model of the block that the answer is about would need to follow the recordings;
+        None where nothing is missing, or it could not be followed.
     next_experiment : NextExperiment
         What to record next.
     data : list of RecordingUsed
@@ -136,6 +140,7 @@ class Findings:
     free_run_note: str = ""
     parameters: dict[str, ParameterFound] = field(default_factory=dict)
     fit: FitErrors = field(default_factory=FitErrors)
+    missing_input: MissingInput | None = None
     next_experiment: NextExperiment = field(default_factory=NextExperiment)
     data: list[RecordingUsed] = field(default_factory=list)
     considered: list[Considered] = field(default_factory=list)

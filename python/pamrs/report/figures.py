@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pamrs._views import decimate
-from pamrs.findings import YOURS, Curves, Findings, Trace
+from pamrs.findings import YOURS, Curves, Findings, MissingInput, Trace
 from pamrs.report.text import (
     display_unit,
     format_number,
@@ -39,6 +39,7 @@ __all__ = [
     "free_head",
     "free_panels",
     "legend_below",
+    "missing_svg",
     "png_bytes",
     "separating_panels",
     "summary_figure",
@@ -324,6 +325,14 @@ def curves(panels: Sequence[Panel], prefix: str) -> str:
     return f'{drawn}<script type="application/json">{text}</script>'
 
 
+def missing_svg(missing: MissingInput) -> str:
+    """The missing input of a block over what it depends on, as SVG text."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.6, 2.9), dpi=150, layout="constrained")
+        missing.plot(figure.subplots()).set_title("")  # the page says it above
+        return svg_text(figure, "missing")
+
+
 def _short(values: FloatArray) -> list[float | None]:
     """Numbers with five digits of their range, null for gaps."""
     known = values[np.isfinite(values)]
@@ -374,7 +383,7 @@ def svg_text(figure: Figure, prefix: str) -> str:
     stream = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": prefix}):
         none: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
-        figure.savefig(stream, format="svg", metadata=none)
+        figure.savefig(stream, format="svg", metadata=none, dpi=figure.dpi)
     text = stream.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r'\bid="', f'id="{prefix}-', text)

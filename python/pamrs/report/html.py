@@ -301,6 +301,12 @@ def _first(diagnosis: Findings) -> Markup | None:
     return _curves(figures.free_panels(diagnosis), "free")
 
 
+def _missing(diagnosis: Findings) -> str | None:
+    """The missing input, where there is one."""
+    found = diagnosis.missing_input
+    return None if found is None else figures.missing_svg(found)
+
+
 def _markup(svg: str | None) -> Markup | None:
     return None if svg is None else Markup(svg)  # noqa: S704
 
@@ -391,6 +397,7 @@ def render(diagnosis: Findings) -> str:
 #: What the template calls each, and what makes it.
 _PICTURES: Final[dict[str, Callable[[Findings], str | None]]] = {
     "chain": chain_svg,
+    "missing": _missing,
     "first": _first,
     "separating": _separating,
 }

@@ -74,7 +74,14 @@ def one_page_pdf(diagnosis: Findings) -> bytes:
 
 
 def _draw_first(part: Any, diagnosis: Findings, most: int) -> None:
-    """The free run, with one legend for all of its panels."""
+    """The free run, with one legend for all of its panels; the missing input, where there is one,
+    in the place of the last of them.
+    """
+    missing = diagnosis.missing_input
+    if missing is not None:
+        part, below = part.subfigures(2, 1, height_ratios=[max(1, most - 1), 1.3])
+        missing.plot(below.subplots())
+        most = max(1, most - 1)
     panels = free_panels(diagnosis)[:most]
     if not panels:
         return

@@ -403,11 +403,11 @@ def searched(part: Part) -> bool:
 
 
 def law_sentence(law: OtherLaw) -> str:
-    """A law that the recordings follow in the place of that of the rig file, in words."""
+    """A law that the recordings follow instead of that of the rig file, in words."""
     before, after = (sized(size, law.unit) for size in (law.before, law.after))
     return (
         f"With {law.name} = {law.other}, not {law.stated} as in the rig file, the refitted model "
-        f"misses {spoken_name(law.channel)} by {after} in the place of {before}"
+        f"misses {spoken_name(law.channel)} by {after} instead of {before}"
     )
 
 

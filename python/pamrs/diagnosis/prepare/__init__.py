@@ -8,7 +8,7 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 `without_rails`,
 `suspected_units` (what recordings cannot be), `uncommanded`, `unusable` (which cannot be used),
 `prepare`, `Prepared`, `binned`, `noise_level`,
-`smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`,
+`smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Input`, `Residual`,
 `available_blocks`, `Unjudged`, `unjudged_blocks` (blocks that the channels do not tell), `begun`,
 `change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`,
 `said_of_warm_starts` (beginnings that nobody measured), `blocks_beside_tanks`, `unread_tanks`,
@@ -24,6 +24,7 @@ from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
 from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings, said_of_warm_starts
 from pamrs.diagnosis.prepare._blocks import (
     Block,
+    Input,
     Residual,
     Unjudged,
     available_blocks,
@@ -68,6 +69,7 @@ __all__ = [
     "AMBIENT",
     "AMBIENT_PRESSURE",
     "Block",
+    "Input",
     "Overlap",
     "Prepared",
     "Residual",

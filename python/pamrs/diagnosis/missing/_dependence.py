@@ -1,0 +1,237 @@
+"""What a missing input depends on most, by regressions that are judged on stretches of time that
+they were not fitted to; and the sentence that says it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.channels import channel_of
+from pamrs.findings import MissingInput, MissingRecording, shown_unit
+from pamrs.report.text import format_number, spoken_name
+
+_HATS = 8  # of a smooth function of one argument
+_FOLDS = 4  # of stretches of time: each is told from the others
+_STRETCHES = 12  # of each recording
+_RIDGE = 1e-3  # of the rows' weight: what no row tells stays zero
+_CLEARER = 0.05  # share of the square by which a less simple function must tell more
+_LEAST_TOLD = 0.4  # share of the square from which an argument explains the input
+_TURN = 0.02  # of the fastest rate, below which a motion has no direction
+_TREND = 0.8  # correlation from which a size grows or falls with an argument
+_ONE_SIDED = 0.8  # mean over mean size from which an input has one direction
+_OTHER_SIZE = 1.3  # ratio of sizes from which they are not the same
+_FASTER = 1.4  # the same of the fastest third of a motion and the middle one
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Along:
+    """All recordings in a row.
+
+    Attributes
+    ----------
+    value, weight : (n,) array
+        The input, and how much of what is known of it the recording tells (0 to 1).
+    arguments : dict of str to (n,) array
+        What was measured along it.
+    fold : (n,) array
+        To which stretches of time a row belongs.
+    recording : (n,) array
+        Its number.
+    """
+
+    value: Array
+    weight: Array
+    arguments: dict[str, Array]
+    fold: NDArray[np.intp]
+    recording: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, recordings: Sequence[MissingRecording], names: Sequence[str]) -> _Along:
+        """Those of some recordings."""
+        arguments = {n: np.concatenate([own.along(n) for own in recordings]) for n in names}
+        value, std = (
+            np.concatenate([getattr(own, n) for own in recordings]) for n in ("value", "std")
+        )
+        widest = max(float(std.max()), 1e-300)
+        weight = np.maximum(1.0 - (std / widest) ** 2, 0.0) + 1e-6
+        folds = [
+            (_STRETCHES * np.arange(own.time.size) // max(1, own.time.size) + k) % _FOLDS
+            for k, own in enumerate(recordings)
+        ]
+        which = np.repeat(np.arange(len(recordings)), [own.time.size for own in recordings])
+        return cls(value, weight, arguments, np.concatenate(folds), which)
+
+    def fitted(self, columns: Array, rows: NDArray[np.bool_]) -> Array:
+        """A function of some columns (n, k), from some rows, at all of them."""
+        weighted = columns[rows] * self.weight[rows, None]
+        ridge = _RIDGE * float(np.sum(self.weight[rows])) / columns.shape[1]
+        normal = weighted.T @ columns[rows] + ridge * np.eye(columns.shape[1])
+        found: Array = columns @ np.linalg.solve(normal, weighted.T @ self.value[rows])
+        return found
+
+    def told(self, columns: Array) -> float:
+        """Share of the input's square that a function tells of stretches it was not fitted to."""
+        guess = np.empty_like(self.value)
+        for k in range(_FOLDS):
+            inside = self.fold == k
+            guess[inside] = self.fitted(columns, ~inside)[inside]
+        left = float(self.weight @ (self.value - guess) ** 2)
+        return 1.0 - left / max(float(self.weight @ self.value**2), 1e-300)
+
+    def mean(self, values: Array, rows: NDArray[np.bool_]) -> float:
+        """Weighted mean of some rows."""
+        return float(np.average(values[rows], weights=self.weight[rows]))
+
+    def thirds(self, x: Array, rows: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+        """Rows with the lowest, the middle and the highest third of some values."""
+        low, high = np.quantile(x[rows], (1.0 / 3.0, 2.0 / 3.0))
+        return [rows & (x <= low), rows & (x > low) & (x < high), rows & (x >= high)]
+
+
+def _hats(x: Array) -> Array:
+    """A smooth function's columns (n, k): hats between quantiles."""
+    knots = np.unique(np.quantile(x, np.linspace(0.0, 1.0, _HATS)))
+    return np.stack([np.interp(x, knots, row) for row in np.eye(knots.size)], axis=1)
+
+
+def _direction(rate: Array) -> Array:
+    """Sign of a rate, smooth where it turns."""
+    fastest = max(float(np.quantile(np.abs(rate), 0.95)), 1e-300)
+    return np.tanh(rate / (_TURN * fastest))
+
+
+def _candidates(along: _Along, position: str, rate: str) -> dict[str, Array]:
+    """Columns of a function of each argument, the simplest first."""
+    way = _direction(along.arguments[rate])
+    found = {"": np.ones((along.value.size, 1))}
+    found[rate] = way[:, None] * _hats(np.abs(along.arguments[rate]))
+    found |= {n: _hats(x) for n, x in along.arguments.items() if n not in (rate, "time")}
+    either = [_hats(along.arguments[position]) * (s * way[:, None] > 0.0) for s in (1.0, -1.0)]
+    found["strokes"] = np.hstack(either)
+    each = [along.recording == k for k in range(along.recording[-1] + 1)]
+    time = [_hats(np.where(own, along.arguments["time"], 0.0)) * own[:, None] for own in each]
+    return found | {"time": np.hstack(time)}
+
+
+def explained(found: MissingInput) -> tuple[str, float, str]:
+    """Tell what a missing input depends on most.
+
+    Parameters
+    ----------
+    found : MissingInput
+        With its recordings, at least one.
+
+    Returns
+    -------
+    argument : str
+        Name of the argument; ``time`` for a steady one, empty where no single one explains it.
+    share : float
+        Share of the input's square that a function of it tells, cross-validated (0 to 1).
+    sentence : str
+        In words.
+    """
+    along = _Along.of(found.recordings, [*found.units])
+    candidates = _candidates(along, found.position, found.rate)
+    told = {name: along.told(columns) for name, columns in candidates.items()}
+    best = max(told.values())
+    name = next(n for n, share in told.items() if share > best - _CLEARER)
+    if best < _LEAST_TOLD:
+        size = along.mean(np.abs(along.value), along.weight > 0.0)
+        return "", max(0.0, best), f"{_size(found, size)}, and no single argument explains it"
+    columns = candidates[name]
+    others = [n for n in found.units if n not in (name, "time", found.rate)]
+    others = [n for n in others if not (name == "strokes" and n == found.position)]
+    deeper = {
+        n: along.told(np.hstack([columns, columns * _scaled(along.arguments[n])[:, None]]))
+        for n in others
+    }
+    beside = max(deeper, key=lambda n: deeper[n], default="")
+    if beside and deeper[beside] < told[name] + _CLEARER:
+        beside = ""
+    sentence = _sentence(found, along, name, along.fitted(columns, along.weight > 0.0))
+    if beside:
+        sentence += _beside(found, along, name, beside)
+    argument = {"": "time", "strokes": found.position}.get(name, name)
+    return argument, min(1.0, max(told[name], 0.0)), sentence
+
+
+def _scaled(x: Array) -> Array:
+    """An argument with mean 0 and standard deviation 1."""
+    centred: Array = (x - x.mean()) / max(float(x.std()), 1e-300)
+    return centred
+
+
+def _size(found: MissingInput, size: float) -> str:
+    """A size of the input in the unit that people read."""
+    unit, factor = shown_unit(found.unit)
+    return f"{format_number(factor * size, 2)} {unit}"
+
+
+def _at(found: MissingInput, name: str, value: float) -> str:
+    """A value of an argument in the unit that people read."""
+    unit, factor = shown_unit(found.units[name])
+    return f"{format_number(factor * value, 2)} {unit}"
+
+
+def _sense(found: MissingInput, mean: float) -> str:
+    """Where an input of one direction goes."""
+    noun = spoken_name(found.block)
+    if found.unit == "kg/s":
+        return f" into the {noun}" if mean > 0.0 else f" out of the {noun}"
+    more = "larger" if mean > 0.0 else "smaller"
+    return f" towards a {more} {spoken_name(found.position)}"
+
+
+def _sentence(found: MissingInput, along: _Along, name: str, fit: Array) -> str:
+    """The input as a function of one argument."""
+    rate = along.arguments[found.rate]
+    every = along.weight > 0.0
+    if name == found.rate:
+        moving = np.abs(rate) > np.median(np.abs(rate))
+        against = along.mean(fit * np.sign(rate), moving) < 0.0
+        told = _size(found, along.mean(np.abs(fit), moving))
+        _, middle, fast = (
+            along.mean(np.abs(fit), rows) if rows.any() else 0.0
+            for rows in along.thirds(np.abs(rate), every)
+        )
+        growing = ", growing with the rate" if fast > _FASTER * middle else ""
+        if channel_of(found.block) in ("arm", "load"):
+            return f"{told} {'against' if against else 'with'} the motion{growing}"
+        ways = ("falls", "grows")[:: 1 if against else -1]
+        noun = spoken_name(found.position)
+        return f"{told} more while the {noun} {ways[0]}, less while it {ways[1]}{growing}"
+    mean, size = along.mean(fit, every), along.mean(np.abs(fit), every)
+    sided = abs(mean) > _ONE_SIDED * size
+    told = _size(found, size) + (_sense(found, mean) if sided else "")
+    if not name:
+        return f"{told}, steadily"
+    if name == "strokes":
+        noun = spoken_name(found.position)
+        return f"{told}, depending on the {noun} and on the direction of its stroke"
+    noun, x = ("time" if name == "time" else spoken_name(name)), along.arguments[name]
+    trend = float(np.corrcoef(np.abs(fit) if sided else fit, x)[0, 1])
+    if name == "time" or abs(trend) < _TREND:
+        return f"{told}, depending on the {noun}"
+    return f"{told}, {'growing' if trend > 0.0 else 'falling'} with the {noun}"
+
+
+def _beside(found: MissingInput, along: _Along, name: str, beside: str) -> str:
+    """How the size of the input depends on a second argument."""
+    rate = np.abs(along.arguments[found.rate])
+    rows = rate > np.median(rate) if name == found.rate else along.weight > 0.0
+    low, _, high = along.thirds(along.arguments[beside], rows)
+    sizes = [along.mean(np.abs(along.value), own) for own in (low, high)]
+    places = [along.mean(along.arguments[beside], own) for own in (low, high)]
+    if max(sizes) < _OTHER_SIZE * min(sizes):
+        return f", other at another {spoken_name(beside)}"
+    larger = int(sizes[1] > sizes[0])
+    ratio = sizes[larger] / max(sizes[1 - larger], 1e-300)
+    times = "twice" if 1.75 < ratio < 2.25 else f"{format_number(ratio, 2)} times"
+    there, here = (_at(found, beside, place) for place in (places[larger], places[1 - larger]))
+    return f", {times} as large at a {spoken_name(beside)} of {there} as of {here}"

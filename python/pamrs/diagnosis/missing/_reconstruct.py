@@ -1,0 +1,301 @@
+"""The input that a block's model would need to follow a recording, by Gauss-Newton."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs import _core
+from pamrs.diagnosis.noise import bins_of
+from pamrs.diagnosis.prepare import Block, Input, Prepared, Residual, binned, residual
+from pamrs.errors import SimulationError
+
+_HAT = 0.04  # [s] from knot to knot: twice as fast as the bins that the residual is told in
+_MOST_KNOTS = 200  # of a window: a sealed chamber is one window, and its input is slow
+_CORRELATION = 6.0  # [knots] over which the input stays what it was
+_SIZES = 10.0 ** np.arange(-2.0, 5.1, 0.25)  # of the input, in the noise levels that it moves
+_HORIZONS = ((0.2, 5), (0.5, 4), (1.0, 8))  # shares of a window, and steps: short is linear
+_FIRST_STEPS = 4  # from nothing with whole windows, before short ones are tried
+_FAR = 3.0  # [noise levels] left in a window whose input was not found
+_ENOUGH = 1.5  # [noise levels squared] left in a window from which on no step is needed
+_ALWAYS = 2  # steps that are made in any case: a small input leaves little
+_HALVINGS = 3  # of an input that takes a model out of its range, before it is left out
+_SHORTER, _LEAST_STEP = 0.35, 0.02  # of a step that left more, and the shortest
+_PORTS = ("arm", "load", "chamber", "supply")  # blocks with a place where an input enters
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """The missing input of a block in one recording.
+
+    Attributes
+    ----------
+    time, value, std : (n,) array
+        Of each knot whose window was followed [s], [SI].
+    before, after : float
+        Mean square of the residual without it and with it [noise levels squared].
+    bins : int
+        Bins of the residual.
+    """
+
+    time: Array
+    value: Array
+    std: Array
+    before: float
+    after: float
+    bins: int
+
+
+def has_port(block: Block) -> bool:
+    """Whether an input enters a block; of another one its reading is what may be wrong."""
+    return block.name.partition(".")[0] in _PORTS
+
+
+class _Windows:
+    """The windows of a recording, of some length, with the heights of an input at their knots.
+
+    Parameters
+    ----------
+    block, core, prepared, noise
+        As of :func:`reconstruct`.
+    at : callable
+        The input that they begin with, as a function of time [s].
+
+    Attributes
+    ----------
+    starts, ends : list of int
+        Samples at which windows begin and end.
+    spacing : int
+        Samples from knot to knot.
+    knots : list of slice
+        Of each window among all heights.
+    bins : list of (k,) array
+        Usable bins of each window.
+    time, heights : (m,) array
+        Of every knot [s], [SI].
+    means, response : (b,) and (b, k) array
+        Residual of each bin and what each knot of its window does to it [noise levels].
+    """
+
+    def __init__(
+        self,
+        block: Block,
+        core: _core.Rig,
+        prepared: Prepared,
+        noise: float,
+        at: Callable[[Array], Array],
+    ) -> None:
+        self.block, self.core, self.prepared, self.noise = block, core, prepared, noise
+        self.starts = prepared.starts(block.window, block.drives)
+        self.ends = [*self.starts[1:], prepared.n]
+        lengths = [b - a for a, b in zip(self.starts, self.ends, strict=True)]
+        longest = max(lengths)
+        self.spacing = max(1, round(_HAT / prepared.dt), -(-longest // _MOST_KNOTS))
+        counts = [Input(self.spacing, np.empty(0)).knots(length) for length in lengths]
+        self.knots = [slice(a, b) for a, b in pairwise(np.cumsum([0, *counts]).tolist())]
+        places = [a + self.spacing * np.arange(k) for a, k in zip(self.starts, counts, strict=True)]
+        self.time: Array = prepared.dt * np.concatenate(places).astype(np.float64)
+        self.heights = at(self.time)
+        self.means, counted, self.response = self._begun()
+        first = bins_of(prepared) * np.arange(self.means.size)
+        window = np.searchsorted(self.starts, first, side="right") - 1
+        within = [window == k for k in range(len(lengths))]
+        self.bins = [np.flatnonzero(own & (counted > 0)) for own in within]
+
+    def _begun(self) -> tuple[Array, Array, Array]:
+        """The first run, with less of the input where the model leaves its range with all of it."""
+        for _ in range(_HALVINGS):
+            try:
+                return self.run(self.heights)
+            except SimulationError:
+                self.heights = 0.5 * self.heights
+        self.heights = np.zeros_like(self.heights)
+        return self.run(self.heights)
+
+    def run(self, heights: Array) -> tuple[Array, Array, Array]:
+        """Residual by bin [noise levels], usable samples and response, of some heights."""
+        block, prepared = self.block, self.prepared
+        if has_port(block):
+            found = residual(block, self.core, prepared, [], Input(self.spacing, heights))
+            value, response = found.value, found.response
+            assert response is not None  # an input was given
+        else:
+            found = residual(block, self.core, prepared, [])
+            hats, own = self._hats(found)
+            value = found.value - found.freed(np.sum(hats * heights[own], axis=1))
+            response = np.apply_along_axis(found.freed, 0, hats)
+        width = bins_of(prepared)
+        means, counts = binned(value, found.rows, width)
+        return means / self.noise, counts, binned(response, found.rows, width)[0] / self.noise
+
+    def _hats(self, found: Residual) -> tuple[Array, NDArray[np.intp]]:
+        """What a reading that errs adds at each sample for each knot of its window (n, k), and
+        which knots these are.
+        """
+        most = max(own.stop - own.start for own in self.knots)
+        hats, which = (
+            np.zeros((found.value.size, most)),
+            np.zeros((found.value.size, most), np.intp),
+        )
+        for a, b, own in zip(self.starts, self.ends, self.knots, strict=True):
+            count = own.stop - own.start
+            place = np.arange(b - a)[:, None] / self.spacing
+            hats[a:b, :count] = np.maximum(0.0, 1.0 - np.abs(place - np.arange(count)))
+            which[a:b, :count] = own.start + np.arange(count)
+        return hats, which
+
+    def left(self, means: Array) -> Array:
+        """Mean square of the residual in each window."""
+        return np.array([float(np.mean(means[i] ** 2)) if i.size else 0.0 for i in self.bins])
+
+    def most_probable(self) -> tuple[Array, Array]:
+        """Heights (m,) of the linear model about the present ones, and their standard deviations:
+        an Ornstein-Uhlenbeck process of one size in the recording, which is the likeliest.
+        """
+        scale = math.sqrt(max(float(np.sum(self.response**2, axis=1).max(initial=0.0)), 1e-300))
+        sizes, parts, evidence = _SIZES / scale, [], np.zeros(_SIZES.size)
+        for rows, own in zip(self.bins, self.knots, strict=True):
+            response = self.response[rows][:, : own.stop - own.start]
+            apart = np.arange(own.stop - own.start)
+            told = response @ np.exp(-np.abs(apart[:, None] - apart) / _CORRELATION)
+            values, axes = np.linalg.eigh(told @ response.T)
+            seen = axes.T @ (self.means[rows] + response @ self.heights[own])
+            values = np.maximum(values, 0.0)
+            variance = 1.0 + np.outer(sizes**2, values)
+            evidence -= 0.5 * np.sum(seen**2 / variance + np.log(variance), axis=1)
+            parts.append((values, seen, axes.T @ told))
+        size = float(sizes[np.argmax(evidence)])
+        heights, std = np.zeros_like(self.heights), np.zeros_like(self.heights)
+        for (values, seen, told), own in zip(parts, self.knots, strict=True):
+            weight = size**2 / (1.0 + size**2 * values)
+            heights[own] = told.T @ (weight * seen)
+            variance = size**2 * (1.0 - told.T**2 @ weight)
+            std[own] = np.sqrt(np.maximum(variance, 0.0))
+        return heights, std
+
+    def improve(self, steps: int) -> None:
+        """Steps of Gauss and Newton, of each window as long as they bear fruit."""
+        length = np.ones(len(self.starts))
+        for step in range(steps):
+            before = self.left(self.means)
+            todo = ((before > _ENOUGH) | (step < _ALWAYS)) & (length > _LEAST_STEP)
+            if not todo.any():
+                return
+            wanted, _ = self.most_probable()
+            tried = self.heights.copy()
+            for k in np.flatnonzero(todo).tolist():
+                own = self.knots[k]
+                tried[own] += length[k] * (wanted[own] - tried[own])
+            try:
+                means, _, response = self.run(tried)
+            except SimulationError:
+                length *= _SHORTER
+                continue
+            better = todo & (self.left(means) < before)
+            length = np.where(todo & ~better, _SHORTER * length, np.minimum(1.0, 2.0 * length))
+            for k in np.flatnonzero(better).tolist():
+                self.take(k, tried, means, response)
+
+    def take(self, k: int, heights: Array, means: Array, response: Array) -> None:
+        """Take over what another run has of one window."""
+        own, rows = self.knots[k], self.bins[k]
+        self.heights[own] = heights[own]
+        self.means[rows], self.response[rows] = means[rows], response[rows]
+
+
+def _nothing(time: Array) -> Array:
+    """No input."""
+    return np.zeros_like(time)
+
+
+def _interpolated(time: Array, heights: Array) -> Callable[[Array], Array]:
+    """An input as a function of time, of its heights at knots."""
+    order = np.argsort(time, kind="stable")
+    return lambda there: np.interp(there, time[order], heights[order])
+
+
+def reconstruct(
+    block: Block, core: _core.Rig, prepared: Prepared, noise: float
+) -> Reconstruction | None:
+    """Find the missing input of a block along a recording.
+
+    Windows whose input is too large for one linear step begin with short windows, which are nearly
+    linear, and grow.
+
+    Parameters
+    ----------
+    block : Block
+        The block: torque at a joint [N m], force at a load [N], mass flow into a chamber or tank
+        [kg/s]; of another one the error of its reading.
+    core : _core.Rig
+        The model, compiled.
+    prepared : Prepared
+        The recording.
+    noise : float
+        Standard deviation of the residual's bin means by noise alone, in the channel's unit.
+
+    Returns
+    -------
+    Reconstruction or None
+        None where no window was followed.
+
+    Raises
+    ------
+    SimulationError
+        If the model without an input leaves the range in which it holds.
+
+    Notes
+    -----
+    Each height has the prior of an Ornstein-Uhlenbeck process whose one size is found by maximum
+    likelihood (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, sections 2.2
+    and 5.4).
+    """
+    windows = _Windows(block, core, prepared, noise, _nothing)
+    first = [windows.means[i] for i in windows.bins]
+    windows.improve(_FIRST_STEPS)
+    if (windows.left(windows.means) > _FAR**2).any() and has_port(block):
+        _from_short(windows)
+    followed = windows.left(windows.means) <= _FAR**2
+    _, std = windows.most_probable()
+    inside = [
+        np.arange(own.start, own.stop)[windows.time[own] < prepared.dt * end]
+        for own, end, good, rows in zip(
+            windows.knots, windows.ends, followed, windows.bins, strict=True
+        )
+        if good and rows.size
+    ]
+    if not inside:
+        return None
+    kept = np.concatenate(inside)
+    without, rest = np.concatenate(first), np.concatenate([windows.means[i] for i in windows.bins])
+    return Reconstruction(
+        windows.time[kept],
+        windows.heights[kept],
+        std[kept],
+        float(np.mean(without**2)),
+        float(np.mean(rest**2)),
+        rest.size,
+    )
+
+
+def _from_short(windows: _Windows) -> None:
+    """Find the input of short windows first, and of each whole window keep the better one."""
+    block, prepared = windows.block, windows.prepared
+    whole = block.window or prepared.n * prepared.dt
+    at: Callable[[Array], Array] = _nothing
+    grown = windows
+    for share, steps in _HORIZONS:
+        own = replace(block, window=block.window if share == 1.0 else share * whole)
+        grown = _Windows(own, windows.core, prepared, windows.noise, at)
+        grown.improve(steps)
+        at = _interpolated(grown.time, grown.heights)
+    better = grown.left(grown.means) < windows.left(windows.means)
+    for k in np.flatnonzero(better).tolist():
+        windows.take(k, grown.heights, grown.means, grown.response)

@@ -1,0 +1,207 @@
+"""The missing input of a block: what its model would need to follow the recordings."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pamrs._views import COLOURS, Panels, View
+from pamrs.channels import read_in
+from pamrs.findings._entry import OPTIONAL, Entry, to_plain
+
+FloatArray = npt.NDArray[np.float64]
+_POINTS = (24, 120)  # of a curve in a picture, and of one over time
+_LETTERS = 76  # of a line above it
+_LEAST_IN_POINT = 4  # values that make one of them
+
+
+@dataclass(frozen=True, eq=False)
+class MissingRecording(Entry):
+    """The missing input in one recording.
+
+    Attributes
+    ----------
+    recording, role : str
+        Its name; ``fit`` or ``held_out``.
+    time : (n,) array
+        [s].
+    value, std : (n,) array
+        The missing input and its standard deviation, in the unit of the whole.
+    arguments : dict of str to (n,) array
+        What was measured along it, by name, in ``units`` of the whole.
+    noises_before, noises_after : float
+        Root mean square of what the block misses without it and with it [noise levels].
+    law : (n,) array, optional
+        What of it the effects take that a diagnosis names.
+    """
+
+    recording: str
+    role: str
+    time: FloatArray
+    value: FloatArray
+    std: FloatArray
+    arguments: Mapping[str, FloatArray]
+    noises_before: float
+    noises_after: float
+    law: FloatArray | None = field(default=None, metadata=OPTIONAL)
+
+    def __post_init__(self) -> None:
+        curves = {n: getattr(self, n) for n in ("time", "value", "std", "law")}
+        for name, values in curves.items():
+            if values is not None:
+                object.__setattr__(self, name, np.asarray(values, dtype=np.float64))
+        own = {n: np.asarray(v, dtype=np.float64) for n, v in self.arguments.items()}
+        object.__setattr__(self, "arguments", own)
+
+    def along(self, argument: str) -> FloatArray:
+        """An argument at each value (n,); the time by its name."""
+        return self.time if argument == "time" else self.arguments[argument]
+
+    def thinned(self, most: int) -> MissingRecording:
+        """The same with so many points at most, of six digits."""
+        every = slice(None, None, max(1, -(-self.time.size // most)))
+
+        def few(values: FloatArray) -> FloatArray:
+            return np.array([float(f"{v:.6g}") for v in values[every]])
+
+        return replace(
+            self,
+            time=few(self.time),
+            value=few(self.value),
+            std=few(self.std),
+            arguments={n: few(v) for n, v in self.arguments.items()},
+            law=None if self.law is None else few(self.law),
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MissingInput(View, Entry):
+    """The input that a block's model would need to follow the recordings: a torque at a joint, a
+    force at a load, a mass flow into a chamber or tank; elsewhere an error of the reading. It is
+    positive where it makes what the block predicts larger.
+
+    Attributes
+    ----------
+    block : str
+        The block, as ``blocks`` of a diagnosis has it.
+    unit : str
+        Of the input: ``N m``, ``N``, ``kg/s``, or that of the reading; SI.
+    sentence : str
+        What it depends on, in words.
+    argument : str
+        What it depends on most: a name of ``units``; empty where no single one explains it.
+    explained : float
+        Share of the input's square that a function of that argument tells in stretches of time that
+        it was not fitted to (0 to 1).
+    share : float
+        Share of the block's mismatch above the noise that the input explains (0 to 1).
+    noises_before, noises_after : float
+        Root mean square of what the block misses without it and with it, over all recordings [noise
+        levels].
+    position, rate : str
+        Names of the arguments that are what the block predicts, and its rate; a stroke goes up
+        where the rate is positive.
+    units : dict of str to str
+        SI unit of each argument.
+    recordings : list of MissingRecording
+        The input in each recording.
+    """
+
+    block: str
+    unit: str
+    sentence: str
+    argument: str
+    explained: float
+    share: float
+    noises_before: float
+    noises_after: float
+    position: str
+    rate: str
+    units: dict[str, str]
+    recordings: list[MissingRecording]
+
+    def __repr__(self) -> str:
+        return f"MissingInput({self.block!r}: {self.sentence})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON has it: a list for each array, null for no number."""
+        found: dict[str, Any] = to_plain(self)
+        return found
+
+    def thinned(self, most: int) -> MissingInput:
+        """Return the same with so many points of each recording at most.
+
+        Parameters
+        ----------
+        most : int
+            At least 1.
+        """
+        return replace(self, recordings=[own.thinned(most) for own in self.recordings])
+
+    def _panels(self) -> Panels:
+        return {"missing_input": partial(_draw, self)} if self.recordings else {}
+
+    def _numbers(self) -> dict[str, str]:
+        return {
+            "block": self.block,
+            "missing": self.sentence,
+            "explains": f"{100 * self.share:.0f} % of the mismatch",
+            "left": f"{self.noises_after:.3g} noise levels of {self.noises_before:.3g}",
+        }
+
+
+def shown_unit(unit: str) -> tuple[str, float]:
+    """The unit that people read an input or an argument in, and the factor from SI."""
+    if unit == "kg/s":
+        return "g/s", 1e3
+    whole, slash, second = unit.partition("/")
+    name, factor = read_in(whole)
+    return f"{name}{slash}{second}", factor
+
+
+def _draw(found: MissingInput, axes: Any) -> None:
+    """The input with its band over what it depends on, up and down strokes apart; over time where
+    no argument tells it, of the recording that has most.
+    """
+    argument, told = found.argument or "time", found.recordings
+    if argument == "time":
+        told = [max(told, key=lambda own: float(np.mean(own.value**2)))]
+    unit, factor = shown_unit(found.unit)
+    of, scale = shown_unit(found.units[argument])
+    x = scale * np.concatenate([own.along(argument) for own in told])
+    y, std = (factor * np.concatenate([getattr(own, n) for own in told]) for n in ("value", "std"))
+    up = np.concatenate([own.arguments[found.rate] for own in told]) > 0.0
+    laws = [own.law for own in told if own.law is not None]
+    law = factor * np.concatenate(laws) if len(laws) == len(told) else None
+    strokes = [(up, "up stroke", COLOURS[0]), (~up, "down stroke", COLOURS[1])]
+    for rows, _, colour in strokes:
+        axes.plot(x[rows], y[rows], ".", color=colour, ms=3.0, alpha=0.4, rasterized=True)
+    if argument == "time":
+        strokes = [(np.ones_like(up), told[0].recording, "#6b7280")]
+    for rows, name, colour in strokes:
+        columns = (x[rows], y[rows], std[rows] ** 2, (y if law is None else law)[rows])
+        there, middle, wide, named = _means(columns, _POINTS[argument == "time"])
+        band = 2.0 * np.sqrt(wide)
+        axes.fill_between(there, middle - band, middle + band, color=colour, alpha=0.25, lw=0.0)
+        axes.plot(there, middle, color=colour, lw=1.4, label=name)
+        if law is not None:
+            last = "what is named" if name == strokes[-1][1] else None
+            axes.plot(there, named, color="black", lw=1.2, ls="--", label=last)
+    axes.axhline(0.0, color="#6b7280", lw=0.7)
+    axes.set_title(textwrap.fill(f"Missing: {found.sentence}", _LETTERS), fontsize="medium")
+    axes.set_xlabel(f"{argument.replace('_', ' ')} [{of}]")
+    axes.set_ylabel(f"missing, {found.block.replace('_', ' ')} [{unit}]")
+    axes.legend(fontsize="small", frameon=False, title="band: ± 2 std")
+
+
+def _means(columns: Sequence[FloatArray], most: int) -> list[FloatArray]:
+    """Means of so many groups of points at most along the first column."""
+    order = np.argsort(columns[0], kind="stable")
+    groups = np.array_split(order, min(most, max(1, order.size // _LEAST_IN_POINT)))
+    return [np.array([float(own[g].mean()) for g in groups if g.size]) for own in columns]
