@@ -159,7 +159,8 @@ class _Windows:
         """Heights (m,) of the linear model about the present ones, and their standard deviations:
         an Ornstein-Uhlenbeck process of one size in the recording, which is the likeliest.
         """
-        scale = math.sqrt(max(float(np.sum(self.response**2, axis=1).max(initial=0.0)), 1e-300))
+        # an input that reaches nothing has any size
+        scale = math.sqrt(float(np.sum(self.response**2, axis=1).max(initial=0.0))) or 1.0
         sizes, parts, evidence = _SIZES / scale, [], np.zeros(_SIZES.size)
         for rows, own in zip(self.bins, self.knots, strict=True):
             response = self.response[rows][:, : own.stop - own.start]
