@@ -17,12 +17,12 @@ from pamrs.report.text import format_number, spoken_name
 _HATS = 8  # of a smooth function of one argument
 _FOLDS = 4  # of stretches of time: each is told from the others
 _STRETCHES = 12  # of each recording
-_RIDGE = 1e-3  # of the rows' weight: what no row tells stays zero
+_SMOOTHING_RIDGE = 1e-3  # of the rows' weight: what no row tells stays zero
 _CLEARER = 0.05  # share of the square by which a less simple function must tell more
 _LEAST_TOLD = 0.4  # share of the square from which an argument explains the input
 _TURN = 0.02  # of the fastest rate, below which a motion has no direction
 _TREND = 0.8  # correlation from which a size grows or falls with an argument
-_ONE_SIDED = 0.8  # mean over mean size from which an input has one direction
+_ONE_SIGN_SHARE = 0.8  # mean over mean size from which an input has one direction
 _OTHER_SIZE = 1.3  # ratio of sizes from which they are not the same
 _FASTER = 1.4  # the same of the fastest third of a motion and the middle one
 
@@ -70,7 +70,7 @@ class _Along:
     def fitted(self, columns: Array, rows: NDArray[np.bool_]) -> Array:
         """A function of some columns (n, k), from some rows, at all of them."""
         weighted = columns[rows] * self.weight[rows, None]
-        ridge = _RIDGE * float(np.sum(self.weight[rows])) / columns.shape[1]
+        ridge = _SMOOTHING_RIDGE * float(np.sum(self.weight[rows])) / columns.shape[1]
         normal = weighted.T @ columns[rows] + ridge * np.eye(columns.shape[1])
         found: Array = columns @ np.linalg.solve(normal, weighted.T @ self.value[rows])
         return found
@@ -207,7 +207,7 @@ def _sentence(found: MissingInput, along: _Along, name: str, fit: Array) -> str:
         noun = spoken_name(found.position)
         return f"{told} more while the {noun} {ways[0]}, less while it {ways[1]}{growing}"
     mean, size = along.mean(fit, every), along.mean(np.abs(fit), every)
-    sided = abs(mean) > _ONE_SIDED * size
+    sided = abs(mean) > _ONE_SIGN_SHARE * size
     told = _size(found, size) + (_sense(found, mean) if sided else "")
     if not name:
         return f"{told}, steadily"

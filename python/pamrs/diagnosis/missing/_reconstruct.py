@@ -18,14 +18,14 @@ from pamrs.errors import SimulationError
 _HAT = 0.04  # [s] from knot to knot: twice as fast as the bins that the residual is told in
 _MOST_KNOTS = 200  # of a window: a sealed chamber is one window, and its input is slow
 _CORRELATION = 6.0  # [knots] over which the input stays what it was
-_SIZES = 10.0 ** np.arange(-2.0, 5.1, 0.25)  # of the input, in the noise levels that it moves
+_INPUT_SIZES = 10.0 ** np.arange(-2.0, 5.1, 0.25)  # of the input, in the noise levels that it moves
 _HORIZONS = ((0.2, 5), (0.5, 4), (1.0, 8))  # shares of a window, and steps: short is linear
 _FIRST_STEPS = 4  # from nothing with whole windows, before short ones are tried
 _FAR = 3.0  # [noise levels] left in a window whose input was not found
 _ENOUGH = 1.5  # [noise levels squared] left in a window from which on no step is needed
 _ALWAYS = 2  # steps that are made in any case: a small input leaves little
 _HALVINGS = 3  # of an input that takes a model out of its range, before it is left out
-_SHORTER, _LEAST_STEP = 0.35, 0.02  # of a step that left more, and the shortest
+_SHORTER, _LEAST_NEWTON_STEP = 0.35, 0.02  # of a step that left more, and the shortest
 _PORTS = ("arm", "load", "chamber", "supply")  # blocks with a place where an input enters
 
 Array = NDArray[np.float64]
@@ -161,7 +161,7 @@ class _Windows:
         """
         # an input that reaches nothing has any size
         scale = math.sqrt(float(np.sum(self.response**2, axis=1).max(initial=0.0))) or 1.0
-        sizes, parts, evidence = _SIZES / scale, [], np.zeros(_SIZES.size)
+        sizes, parts, evidence = _INPUT_SIZES / scale, [], np.zeros(_INPUT_SIZES.size)
         for rows, own in zip(self.bins, self.knots, strict=True):
             response = self.response[rows][:, : own.stop - own.start]
             apart = np.arange(own.stop - own.start)
@@ -186,7 +186,7 @@ class _Windows:
         length = np.ones(len(self.starts))
         for step in range(steps):
             before = self.left(self.means)
-            todo = ((before > _ENOUGH) | (step < _ALWAYS)) & (length > _LEAST_STEP)
+            todo = ((before > _ENOUGH) | (step < _ALWAYS)) & (length > _LEAST_NEWTON_STEP)
             if not todo.any():
                 return
             wanted, _ = self.most_probable()
