@@ -23,7 +23,7 @@ PACKAGES = {
     "cli": 1380,
     "control": 4744,
     "design": 548,
-    "diagnosis": 10827,
+    "diagnosis": 10833,
     "effects": 409,
     "experiments": 1068,
     "findings": 915,
@@ -31,7 +31,7 @@ PACKAGES = {
     "library": 71,
     "recordings": 4903,
     "report": 2123,
-    "rig": 2265,
+    "rig": 2258,
     "rigs": 139,
     "simulation": 1110,
     "studio": 681,
@@ -40,7 +40,7 @@ PACKAGES = {
 #: The same of what is not the package.
 ASIDE = {"tests": 29343, "trial": 5358, "reproduction": 4960}
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 36218
+MOST = 36217
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -374,14 +374,14 @@ def _under_best_law(
     mismatch.
     """
 
-    def problems(rig: Rig) -> tuple[Problem, Problem, list[Unjudged]]:
+    def divided(rig: Rig) -> tuple[Problem, Problem, list[Unjudged]]:
         own, held, unjudged, _ = _problems(case.with_rig(rig), inner.settings, asked)
         return *_on_time(own, held, rig)[:2], unjudged
 
     best, quiet = stated, Steps(None, within=_JUDGED)
-    for choice in promising_laws(case.rig, inner, stated, lambda rig: problems(rig)[0]):
+    for choice, recordings in promising_laws(case.rig, inner, stated, divided):
         with suppress(PamrsError):  # a rig that these recordings cannot be of
-            other, _, _ = _physics(case.with_rig(choice.rig), *problems(choice.rig), quiet)
+            other, _, _ = _physics(case.with_rig(choice.rig), *recordings, quiet)
             best = under(choice, other, stated) if is_better(other, best) else best
     return best
 

@@ -6,25 +6,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 from pamrs.diagnosis.evidence import without_autocorrelation
 from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.prepare import Unjudged
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import refitted
 from pamrs.errors import PamrsError
-from pamrs.findings import ChannelError, FreeRun, OtherLaw, Trace
+from pamrs.findings import BlockMismatch, ChannelError, FreeRun, OtherLaw, Trace
 from pamrs.rig import OtherChoice, Rig, other_choices
 
 _BETTER = 0.5  # share of a squared error that another law leaves, from which it is looked at
 _NO_WORSE = 1.1  # ratio of two errors that count as equal
 
 
+Divided = tuple[Problem, Problem, list[Unjudged]]
+"""Recordings to fit, held-out ones, and blocks that are not judged."""
+
+
 def promising_laws(
-    rig: Rig, problem: Problem, found: Diagnosis, prepared: Callable[[Rig], Problem]
-) -> Iterator[OtherChoice]:
-    """Other laws whose baseline misses a suspect block by clearly less than that of the rig file.
+    rig: Rig, problem: Problem, found: Diagnosis, prepared: Callable[[Rig], Divided]
+) -> Iterator[tuple[OtherChoice, Divided]]:
+    """Other laws, with the recordings under each, whose baseline misses a suspect block by clearly
+    less than that of the rig file.
 
     Parameters
     ----------
@@ -35,7 +40,7 @@ def promising_laws(
     found : Diagnosis
         Their diagnosis under the laws of the rig file.
     prepared : callable
-        The recordings to fit under another rig.
+        The recordings under another rig.
     """
     suspects = {part.block for part in found.answer.parts}
     for mechanical in (False, True):
@@ -45,9 +50,13 @@ def promising_laws(
         names = [b.name for b in own]
         stated = _missed(rig, problem, names)
         for choice in other_choices(rig, ("muscle",) if mechanical else ("chamber", "valve")):
-            with suppress(PamrsError):  # a rig that these recordings cannot be of
-                if _missed(choice.rig, prepared(choice.rig), names) < _BETTER * stated:
-                    yield choice
+            try:
+                divided = prepared(choice.rig)
+                missed = _missed(choice.rig, divided[0], names)
+            except PamrsError:
+                continue  # a rig that these recordings cannot be of
+            if missed < _BETTER * stated:
+                yield choice, divided
 
 
 def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:
@@ -62,22 +71,22 @@ def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:
 
 
 def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
-    """Whether an answer under another law leaves clearly less of the channels that the answer under
-    the stated law misses, or no more of them with fewer names; physics without a name is not better
-    than a name.
+    """True where an answer under another law leaves clearly less of the channels that the answer
+    under the stated law misses, or no more of them with fewer names; physics without a name is not
+    better than a name.
     """
     if other.answer.verdict == "unlisted" and stated.answer.named:
         return False
-    channels = _channels(stated)
+    channels = [m.channel for m in _mismatches(stated)]
     own, before = (_noises(d.proven, channels) for d in (other, stated))
     fewer = len(other.answer.named) < len(stated.answer.named)
     doubtful = not stated.answer.named and stated.answer.parts and not other.answer.parts
     return own**2 < _BETTER * before**2 or (bool(fewer or doubtful) and own < _NO_WORSE * before)
 
 
-def _channels(found: Diagnosis) -> list[str]:
-    """Channels of the groups of blocks in which something is or may be missing or wrong."""
-    return [m.channel for part in found.answer.parts for m in part.group.mismatch]
+def _mismatches(found: Diagnosis) -> list[BlockMismatch]:
+    """Those of the groups of blocks in which something is or may be missing or wrong."""
+    return [m for part in found.answer.parts for m in part.group.mismatch]
 
 
 def _noises(errors: Mapping[str, ChannelError], channels: Sequence[str]) -> float:
@@ -91,15 +100,10 @@ def under(choice: OtherChoice, other: Diagnosis, stated: Diagnosis) -> Diagnosis
     as that of the user.
     """
     own, before = other.proven, stated.proven
-    both = [
-        (m.channel, m.unit)
-        for part in stated.answer.parts
-        for m in part.group.mismatch
-        if m.channel in own and m.channel in before
-    ]
-    channel, unit = max(both, key=lambda one: before[one[0]].refit / before[one[0]].noise)
-    sizes = before[channel].refit, own[channel].refit, own[channel].noise
-    law = OtherLaw(choice.name, choice.stated, choice.other, channel, unit, *sizes)
+    both = [m for m in _mismatches(stated) if m.channel in own and m.channel in before]
+    most = max(both, key=lambda m: before[m.channel].refit / before[m.channel].noise)
+    sizes = before[most.channel].refit, own[most.channel].refit, own[most.channel].noise
+    law = OtherLaw(choice.name, choice.stated, choice.other, most.channel, most.unit, *sizes)
     fit = replace(
         other.fit,
         channels=_with_before(other.fit.channels, stated.fit.channels),

@@ -64,7 +64,7 @@ class MissingRecording(Entry):
         return self.time if argument == "time" else self.arguments[argument]
 
     def thinned(self, most: int) -> MissingRecording:
-        """The same with so many points at most, of six digits."""
+        """Thin it to so many points at most, of six digits."""
         every = slice(None, None, max(1, -(-self.time.size // most)))
 
         def few(values: FloatArray) -> FloatArray:

@@ -208,7 +208,7 @@ def undetermined(effect: EffectFound) -> list[str]:
 
 
 def choice_words(effect: EffectFound, name: str) -> str:
-    """What the value of a choice stands for, ``the gauge is at the valve``; empty for a number."""
+    """Words for the value of a choice, ``the gauge is at the valve``; empty for a number."""
     info = EFFECTS.get(effect.id)
     form = info.form(effect.form) if info else None
     own = next((p for p in form.parameters if p.name == name), None) if form else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -79,7 +79,7 @@ def _with_law(rig: Rig, kind: str, key: str, other: str) -> Rig:
         table[key] = other
         for own in BLOCKS[kind]:
             if own.name in table and not of_kind(kind, table, own):
-                table.update(_in_other_form(own.name, table))
+                table.update(_in_other_form(rig, qualified(kind, name), own.name))
                 del table[own.name]
         for own in BLOCKS[kind]:
             usual = own.default if own.only and own.kind == "scalar" and not own.path else None
@@ -93,30 +93,18 @@ def _with_law(rig: Rig, kind: str, key: str, other: str) -> Rig:
     return changed
 
 
-def _in_other_form(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
-    """What a key of one law of a valve's flow is in the other."""
+def _in_other_form(rig: Rig, block: str, name: str) -> dict[str, Any]:
+    """Keys of the other law of a valve's flow that stand for a key of its own."""
     if name == "discharge_area_max":
-        own, tol = _number(table[name], "m2")
-        sonic = {"value": own * _SONIC_CONDUCTANCE, "unit": "m3/(s Pa)"}
-        sonic["tol"] = tol * _SONIC_CONDUCTANCE
+        area = rig.parameters[f"{block}.{name}"]
+        sonic = {"value": area.value * _SONIC_CONDUCTANCE, "unit": "m3/(s Pa)"}
+        sonic["tol"] = area.tol * _SONIC_CONDUCTANCE
         ratio = {"value": _ORIFICE_RATIO, "unit": "1"}
         both = {f"{way}_conductance": sonic for way in ("fill", "vent")}
         return both | {f"{way}_critical_ratio": ratio for way in ("fill", "vent")}
     if name == "fill_conductance":
-        (fill, tol), (vent, _) = (
-            _number(table[f"{way}_conductance"], "m3/(s Pa)") for way in ("fill", "vent")
-        )
-        area = math.sqrt(fill * vent) / _SONIC_CONDUCTANCE
-        known = {"value": area, "unit": "m2", "tol": tol / fill * area}
+        fill, vent = (rig.parameters[f"{block}.{way}_conductance"] for way in ("fill", "vent"))
+        size = math.sqrt(fill.value * vent.value) / _SONIC_CONDUCTANCE
+        known = {"value": size, "unit": "m2", "tol": fill.tol / fill.value * size}
         return {"discharge_area_max": known}
     return {}
-
-
-def _number(entry: Any, si: str) -> tuple[float, float]:
-    """Value and tolerance of an entry of a file [SI]."""
-    from pamrs.units import to_si
-
-    plain: dict[str, Any] = {"value": entry, "unit": si}
-    plain |= entry if isinstance(entry, Mapping) else {}
-    value, tol = (float(plain.get(key, 0.0)) for key in ("value", "tol"))
-    return to_si(value, plain["unit"], si), to_si(tol, plain["unit"], si)

@@ -126,8 +126,8 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
 
 
 def _is_unlikely(fit: Fit) -> bool:
-    """Whether values inside their tolerances and starts of gases lie further from what is known of
-    them, together, than one in a hundred draws of them.
+    """True where values inside their tolerances and starts of gases lie further from what is known
+    of them, together, than one in a hundred draws of them.
     """
     moved = sum(abs(far) > 0.0 for far in fit.held_by_prior.values())
     starts = sum(found.strain > 0.0 for found in fit.residuals.values())

@@ -1,5 +1,5 @@
-"""What a missing input depends on most, by regressions that are judged on stretches of time that
-they were not fitted to; and the sentence that says it.
+"""Dependence of a missing input on what was measured, by regressions that are judged on
+stretches of time that they were not fitted to; and the sentence that says it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class _Along:
 
     @classmethod
     def of(cls, recordings: Sequence[MissingRecording], names: Sequence[str]) -> _Along:
-        """Those of some recordings."""
+        """Rows of some recordings."""
         arguments = {n: np.concatenate([own.along(n) for own in recordings]) for n in names}
         value, std = (
             np.concatenate([getattr(own, n) for own in recordings]) for n in ("value", "std")
@@ -143,7 +143,7 @@ def explained(found: MissingInput) -> tuple[str, float, str]:
     name = next(n for n, share in told.items() if share > best - _CLEARER)
     if best < _LEAST_TOLD:
         size = along.mean(np.abs(along.value), along.weight > 0.0)
-        return "", max(0.0, best), f"{_size(found, size)}, and no single argument explains it"
+        return "", max(0.0, best), f"{_shown(size, found.unit)}, and no single argument explains it"
     columns = candidates[name]
     others = [n for n in found.units if n not in (name, "time", found.rate)]
     others = [n for n in others if not (name == "strokes" and n == found.position)]
@@ -167,20 +167,14 @@ def _scaled(x: Array) -> Array:
     return centred
 
 
-def _size(found: MissingInput, size: float) -> str:
-    """A size of the input in the unit that people read."""
-    unit, factor = shown_unit(found.unit)
-    return f"{format_number(factor * size, 2)} {unit}"
-
-
-def _at(found: MissingInput, name: str, value: float) -> str:
-    """A value of an argument in the unit that people read."""
-    unit, factor = shown_unit(found.units[name])
-    return f"{format_number(factor * value, 2)} {unit}"
+def _shown(value: float, unit: str) -> str:
+    """A size of the input, or a value of an argument, in the unit that people read."""
+    own, factor = shown_unit(unit)
+    return f"{format_number(factor * value, 2)} {own}"
 
 
 def _sense(found: MissingInput, mean: float) -> str:
-    """Where an input of one direction goes."""
+    """Direction of an input of one sign, in words."""
     noun = spoken_name(found.block)
     if found.unit == "kg/s":
         return f" into the {noun}" if mean > 0.0 else f" out of the {noun}"
@@ -195,7 +189,7 @@ def _sentence(found: MissingInput, along: _Along, name: str, fit: Array) -> str:
     if name == found.rate:
         moving = np.abs(rate) > np.median(np.abs(rate))
         against = along.mean(fit * np.sign(rate), moving) < 0.0
-        told = _size(found, along.mean(np.abs(fit), moving))
+        told = _shown(along.mean(np.abs(fit), moving), found.unit)
         _, middle, fast = (
             along.mean(np.abs(fit), rows) if rows.any() else 0.0
             for rows in along.thirds(np.abs(rate), every)
@@ -208,7 +202,7 @@ def _sentence(found: MissingInput, along: _Along, name: str, fit: Array) -> str:
         return f"{told} more while the {noun} {ways[0]}, less while it {ways[1]}{growing}"
     mean, size = along.mean(fit, every), along.mean(np.abs(fit), every)
     sided = abs(mean) > _ONE_SIGN_SHARE * size
-    told = _size(found, size) + (_sense(found, mean) if sided else "")
+    told = _shown(size, found.unit) + (_sense(found, mean) if sided else "")
     if not name:
         return f"{told}, steadily"
     if name == "strokes":
@@ -222,7 +216,7 @@ def _sentence(found: MissingInput, along: _Along, name: str, fit: Array) -> str:
 
 
 def _beside(found: MissingInput, along: _Along, name: str, beside: str) -> str:
-    """How the size of the input depends on a second argument."""
+    """Dependence of the input's size on a second argument, in words."""
     rate = np.abs(along.arguments[found.rate])
     rows = rate > np.median(rate) if name == found.rate else along.weight > 0.0
     low, _, high = along.thirds(along.arguments[beside], rows)
@@ -233,5 +227,7 @@ def _beside(found: MissingInput, along: _Along, name: str, beside: str) -> str:
     larger = int(sizes[1] > sizes[0])
     ratio = sizes[larger] / max(sizes[1 - larger], 1e-300)
     times = "twice" if 1.75 < ratio < 2.25 else f"{format_number(ratio, 2)} times"
-    there, here = (_at(found, beside, place) for place in (places[larger], places[1 - larger]))
+    there, here = (
+        _shown(place, found.units[beside]) for place in (places[larger], places[1 - larger])
+    )
     return f", {times} as large at a {spoken_name(beside)} of {there} as of {here}"

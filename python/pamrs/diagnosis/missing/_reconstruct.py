@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs.channels import channel_of
 from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Block, Input, Prepared, Residual, binned, residual
 from pamrs.errors import SimulationError
@@ -26,7 +28,9 @@ _ENOUGH = 1.5  # [noise levels squared] left in a window from which on no step i
 _ALWAYS = 2  # steps that are made in any case: a small input leaves little
 _HALVINGS = 3  # of an input that takes a model out of its range, before it is left out
 _SHORTER, _LEAST_NEWTON_STEP = 0.35, 0.02  # of a step that left more, and the shortest
-_PORTS = ("arm", "load", "chamber", "supply")  # blocks with a place where an input enters
+
+INPUT_UNITS = {"arm": "N m", "load": "N", "chamber": "kg/s", "supply": "kg/s"}
+"""Unit of the input of each kind of block that one enters."""
 
 Array = NDArray[np.float64]
 
@@ -54,8 +58,8 @@ class Reconstruction:
 
 
 def has_port(block: Block) -> bool:
-    """Whether an input enters a block; of another one its reading is what may be wrong."""
-    return block.name.partition(".")[0] in _PORTS
+    """True where an input enters a block; of another one its reading is what may be wrong."""
+    return channel_of(block.name) in INPUT_UNITS
 
 
 class _Windows:
@@ -127,17 +131,24 @@ class _Windows:
             value, response = found.value, found.response
             assert response is not None  # an input was given
         else:
-            found = residual(block, self.core, prepared, [])
-            hats, own = self._hats(found)
+            found, hats, own, response = self._reading
             value = found.value - found.freed(np.sum(hats * heights[own], axis=1))
-            response = np.apply_along_axis(found.freed, 0, hats)
         width = bins_of(prepared)
         means, counts = binned(value, found.rows, width)
         return means / self.noise, counts, binned(response, found.rows, width)[0] / self.noise
 
+    @cached_property
+    def _reading(self) -> tuple[Residual, Array, NDArray[np.intp], Array]:
+        """The residual of a block whose reading errs, whatever the heights; hats of the knots of
+        each sample's window (n, k), which knots these are, and what they do to the residual (n, k).
+        """
+        found = residual(self.block, self.core, self.prepared, [])
+        hats, which = self._hats(found)
+        return found, hats, which, np.apply_along_axis(found.freed, 0, hats)
+
     def _hats(self, found: Residual) -> tuple[Array, NDArray[np.intp]]:
-        """What a reading that errs adds at each sample for each knot of its window (n, k), and
-        which knots these are.
+        """Error of a reading at each sample for each knot of its window (n, k), and which knots
+        these are.
         """
         most = max(own.stop - own.start for own in self.knots)
         hats, which = (

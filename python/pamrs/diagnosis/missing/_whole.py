@@ -13,6 +13,7 @@ from pamrs.channels import block_of, channel_of, dotted, rate_of, unit_of
 from pamrs.diagnosis.fit import Key, Problem
 from pamrs.diagnosis.missing._dependence import explained
 from pamrs.diagnosis.missing._reconstruct import (
+    INPUT_UNITS,
     Array,
     Reconstruction,
     has_port,
@@ -23,7 +24,6 @@ from pamrs.diagnosis.prepare import Block, Prepared, residual
 from pamrs.errors import SimulationError
 from pamrs.findings import MissingInput, MissingRecording
 
-_UNITS = {"arm": "N m", "load": "N", "chamber": "kg/s", "supply": "kg/s"}
 _MOTION = ("joint_angle", "length")
 
 
@@ -135,7 +135,7 @@ def _told(
         for n in ("before", "after")
     )
     units = {name: _unit(name) for name in ("time", *told[0].arguments)}
-    unit = _UNITS[channel_of(block.name)] if has_port(block) else unit_of(block.channel)
+    unit = INPUT_UNITS.get(channel_of(block.name)) or unit_of(block.channel)
     above = before > margin
     share = 1.0 - max(0.0, after - 1.0) / (before - 1.0) if above else 0.0
     position = block.channel if has_port(block) or not _moving(told) else _moving(told)[0]
@@ -181,7 +181,7 @@ def _unit(name: str) -> str:
 
 
 def _arguments(block: Block, prepared: Prepared, time: Array) -> dict[str, Array]:
-    """What was measured along an input: what the block predicts, what drives it, the rates of both
+    """Measurements along an input: what the block predicts, what drives it, the rates of both
     where they move, and the commands.
     """
     own = np.arange(prepared.n) * prepared.dt
