@@ -88,7 +88,7 @@ def _located(judged: Judged) -> str | None:
     worst = judged.wrong or tuple(sorted(moved, key=lambda name: -abs(moved[name])))
     told = [b.name for b in group.blocks if worst and depends(b, worst[0])]
     named = [b.name for b in group.blocks if any(concerns(term, b) for term in judged.named)]
-    return next(iter([*reversed(told), *named]), None)
+    return next(iter([*reversed(told), *reversed(named)]), None)
 
 
 def not_judged(block: Unjudged) -> BlockVerdict:

@@ -79,7 +79,7 @@ from pamrs.diagnosis.search._sets import (
     settles,
     with_freed_values,
 )
-from pamrs.diagnosis.search._wrong_parameters import find_wrong_values, free_suspects
+from pamrs.diagnosis.search._wrong_parameters import find_wrong_values, free_suspects, weigh_quiet
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
     CATALOGUE,
@@ -155,17 +155,14 @@ def examine(
         names = " and ".join(b.name for b in blocks)
         say(Line(f"{names}: judged", 1.0, part=names))
 
-    def begin(blocks: list[Block]) -> Mismatch | BlockGroup | None:
+    def begin(blocks: list[Block]) -> Mismatch | Quiet | None:
         what = f"the judgement of {' and '.join(b.name for b in blocks)}"
         work = partial(_begin_part, fitted, held, nominal, blocks, say)
-        found = losses.part(what, work, through=through)
-        if not isinstance(found, Mismatch):
-            judged(blocks)
-        return found
+        return losses.part(what, work, through=through)
 
-    def end(part: Mismatch | BlockGroup | None) -> list[BlockGroup]:
-        if part is None or isinstance(part, BlockGroup):
-            return [part] if part else []
+    def end(part: Mismatch | Quiet | None) -> list[BlockGroup]:
+        if part is None:
+            return []
         others = [p for p in begun if isinstance(p, Mismatch) and p is not part]
         starts = [start for p in others for start in p.leading]
         names = " and ".join(b.name for b in part.refit.trial.inner.blocks)
@@ -193,7 +190,7 @@ def examine(
 
 def _begin_part(
     fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say
-) -> Mismatch | BlockGroup:
+) -> Mismatch | Quiet:
     """Some blocks examined by themselves: a mismatch with its hypotheses, or, where they keep only
     noise, the group that they are.
     """
@@ -217,13 +214,14 @@ def _begin_part(
         common = inner.losses.part(what, lambda: _fit_all_recordings(refit.trial, refit.start))
         if common is not None:
             tell("one baseline leaves noise in all recordings")
-            return _healthy_group(refit, common)
+            return Quiet(refit, _healthy_group(refit, common))
     if refit.trial.suspects:
         return _tried(refit, tell)
     quiet = refit.group([refit.start], {UNDECIDED: 1.0}, None)
     trial = replace(refit.trial, suspects=blocks)
     what = "the search for a value at the end of its range"
-    return inner.losses.part(what, lambda: find_wrong_values(trial, quiet, tell), quiet)
+    found = inner.losses.part(what, lambda: find_wrong_values(trial, quiet, tell), quiet)
+    return Quiet(refit, found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -580,6 +578,42 @@ class Mismatch:
                 return parts
         what = "the search for a form of what is missing"
         return [part(what, lambda: _add_form(group, refit, say, self.search.tell), group)]
+
+
+@dataclass(frozen=True, eq=False)
+class Quiet:
+    """Some blocks of which the refit leaves only noise.
+
+    Attributes
+    ----------
+    refit : _Refit
+        The refit of their parameters.
+    group : BlockGroup
+        The baseline, and values that the file may be wrong about.
+    """
+
+    refit: _Refit
+    group: BlockGroup
+
+    def with_effects_of_others(self, starts: list[Start]) -> Quiet:
+        """The same with what other blocks name tried here, where it acts: it costs nothing again,
+        and is there where recordings and values are as probable with it.
+        """
+        trial = replace(self.refit.trial, suspects=self.group.blocks)
+        baseline = self.group.candidates[0].fit
+        acting = [s for s in starts if any(acts_in(s.effect, b) for b in trial.suspects)]
+        found = []
+        for start in acting:
+            # at the values that it has there, before what the baseline hid it by lets go of it
+            known = replace(start, free={}, held=start.held | start.free)
+            first = trial.fit_effects([known], baseline, trial.white)
+            both = first and trial.fit_effects([start], first.fit, trial.white)
+            found += [both] if both and _is_visible(both, start) else []
+        return replace(self, group=weigh_quiet(self.group, dict.fromkeys(found, 0.0)))
+
+    def groups(self, _: Say) -> list[BlockGroup]:
+        """The blocks as one group."""
+        return [self.group]
 
 
 def _leading(weighed: Mapping[Hypothesis, float]) -> Hypothesis:

@@ -283,29 +283,28 @@ def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], N
     """
     start = quiet.candidates[0]
     found = free_suspects(trial, start.fit, start.fit, say, share=0.0)
-    shown = [
-        c
-        for c in found
-        if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)
-    ]
-    if not shown:
-        return quiet
     # a file that is further outside its tolerances is rarer, but less and less so
     settings, walls = trial.settings, trial.settings.most_tolerances
+    prices = {c: settings.file_log_odds * len(c.wrong) + c.outside(walls) for c in found}
+    return weigh_quiet(quiet, prices)
+
+
+def weigh_quiet(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> BlockGroup:
+    """A group whose baseline leaves only noise, with further hypotheses and the logarithm of what
+    each costs; those that leave more than noise, or predict worse, are left out.
+    """
+    start = quiet.candidates[0]
     scores = {
-        c: _plausibility(c)
-        - _plausibility(start)
-        - settings.file_log_odds * len(c.wrong)
-        - c.outside(walls)
-        for c in shown
+        c: _plausibility(c) - _plausibility(start) - price
+        for c, price in prices.items()
+        if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)
     }
-    top = max(0.0, *scores.values())
-    weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
-    total = math.exp(-top) + sum(weights.values())
-    share = {c.hypothesis: weights[c] / total for c in shown}
-    kept = 1.0 - sum(share.values())
-    probabilities = {UNDECIDED: kept} | share
-    return replace(quiet, candidates=[*quiet.candidates, *shown], probabilities=probabilities)
+    top = max(0.0, *scores.values(), 0.0)
+    weights = {c.hypothesis: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
+    kept = {h: p * math.exp(-top) for h, p in quiet.probabilities.items()}
+    total = sum(weights.values()) + sum(kept.values())
+    probabilities = {h: w / total for h, w in (kept | weights).items()}
+    return replace(quiet, candidates=[*quiet.candidates, *scores], probabilities=probabilities)
 
 
 def _plausibility(candidate: Candidate) -> float:
