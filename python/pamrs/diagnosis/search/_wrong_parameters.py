@@ -27,7 +27,6 @@ from pamrs.diagnosis.fit import (
     two_at_a_time,
 )
 from pamrs.diagnosis.prepare import Block
-from pamrs.effects import UNDECIDED
 from pamrs.rig import Rig
 from pamrs.rig.schema import split_name
 
