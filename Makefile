@@ -19,7 +19,7 @@ RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
 CARGO := env -u MAKEFLAGS -u MFLAGS cargo
 # One by one, since cargo fmt does not see modules that a macro declares.
 RUSTFMT := find crates -name '*.rs' -print0 | xargs -0 rustfmt --edition 2021
-PYTHON_SOURCES := .ci docs/conf.py docs/_site python tests trial demo benchmarks fingerprints reproduction cases
+PYTHON_SOURCES := .ci docs/conf.py docs/_site python tests trial demo benchmarks fingerprints reproduction cases conftest.py
 # Processes that pytest takes; a file of tests stays in one, so that what its tests share is computed once.
 WORKERS ?= $(shell nproc 2>/dev/null || echo 2)
 PYTEST := $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile

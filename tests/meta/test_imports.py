@@ -201,10 +201,11 @@ def imported(node: ast.AST) -> list[str]:
 
 
 def imports_of(folder: Path) -> list[tuple[Path, str]]:
-    """Every file below a folder with each of its imports."""
+    """Every file below a folder, but its tests, with each of its imports."""
     return [
         (path, name)
         for path in sorted(folder.rglob("*.py"))
+        if folder / "tests" not in path.parents
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         for name in imported(node)
     ]

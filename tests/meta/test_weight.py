@@ -23,7 +23,7 @@ PACKAGES = {
     "cli": 1380,
     "control": 4744,
     "design": 548,
-    "diagnosis": 10833,
+    "diagnosis": 10850,
     "effects": 409,
     "experiments": 1068,
     "findings": 915,
@@ -38,9 +38,16 @@ PACKAGES = {
     "sweeps": 830,
 }
 #: The same of what is not the package.
-ASIDE = {"tests": 29343, "trial": 5358, "reproduction": 4960}
+ASIDE = {
+    "tests": 26652,
+    "benchmarks/tests": 226,
+    "reproduction": 4960,
+    "reproduction/tests": 1306,
+    "trial": 5358,
+    "trial/tests": 1144,
+}
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 36217
+MOST = 36234
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 
@@ -51,7 +58,9 @@ def tree(path: Path) -> ast.Module:
 
 
 def files(folder: str) -> list[Path]:
-    return sorted((ROOT / folder).rglob("*.py"))
+    """Python files below a folder, but for those in a folder of tests beside them."""
+    home = ROOT / folder
+    return sorted(path for path in home.rglob("*.py") if home / "tests" not in path.parents)
 
 
 def statements(path: Path) -> int:

@@ -5,11 +5,11 @@ import json
 
 import pytest
 
-from tests.trial.test_cases import LEAK, key_of
 from trial.__main__ import main
 from trial.marks import gap_of
 from trial.report import checked
 from trial.summary import mean_interval, median_interval, wilson
+from trial.tests.test_cases import LEAK, key_of
 
 
 @pytest.fixture

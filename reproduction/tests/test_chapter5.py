@@ -11,6 +11,7 @@ from pamrs.control import AdaptiveSliding, Neural
 from pamrs.errors import ParameterError
 from reproduction import chapter5
 from reproduction.statement_tables import to_csv
+from reproduction.tests.pages import by_fact
 from reproduction.tracking import (
     KINDS,
     PERIOD,
@@ -22,7 +23,6 @@ from reproduction.tracking import (
     waves,
 )
 from reproduction.tracking_runs import EFFECTS, MIDDLE, SHORT, WRONG, Plan
-from tests.reproduction.pages import by_fact
 
 #: Shorter still than the short plan: a few samples of everything.
 TINY = Plan(record=12.0, training=12.0, cases=((MIDDLE, ""), (MIDDLE, "muscle_hysteresis")))

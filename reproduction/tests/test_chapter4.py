@@ -12,8 +12,8 @@ from reproduction import chapter4, lift
 from reproduction.chapter4_statements import SERIES, statements
 from reproduction.elbow import PSI
 from reproduction.lift import GAINS, PAYLOADS, VARIANTS, Lifts
+from reproduction.tests.pages import facts
 from reproduction.two_branches import two_branches
-from tests.reproduction.pages import facts
 from tests.tables import rows_of
 
 TIME = np.arange(2501) * 0.01

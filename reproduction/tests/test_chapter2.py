@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from pamrs.library import ch2_075in
 from reproduction import chapter2
 from reproduction import stand_in as stand_ins
-from tests.reproduction.pages import by_fact, page_of
+from reproduction.tests.pages import by_fact, page_of
 
 #: Statements that do not agree; one that changes sides must be noticed.
 DIFFER = {

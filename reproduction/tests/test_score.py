@@ -12,8 +12,8 @@ from reproduction import CHAPTERS, chapter4, chapter5, chapter5_comparison, trac
 from reproduction.chapter4_statements import on_stop, restless, statements
 from reproduction.comparison import BASES, KINDS
 from reproduction.lift import GAINS, Map
-from tests.reproduction.pages import facts, page_of
-from tests.reproduction.test_chapter4 import made, verdicts
+from reproduction.tests.pages import facts, page_of
+from reproduction.tests.test_chapter4 import made, verdicts
 
 #: Sentences that state several numbers or orders, each of which is a row.
 SEVERAL = (

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 import pamrs
-from tests.trial import test_cases as cases
-from tests.trial.test_cases import again, group
 from trial.bench import Bench
 from trial.cases import _truths, make
 from trial.concealed import store
@@ -34,6 +32,8 @@ from trial.pooled import page, pooled
 from trial.rig_kinds import PAIR, RIGS, nominal, nominal_pair, stated
 from trial.selfcheck import against_lsoda
 from trial.tables import markdown, scores, to_json
+from trial.tests import test_cases as cases
+from trial.tests.test_cases import again, group
 
 MODEL, TOLERANCE = stated(PAIR)
 PAR = pair_parameters(MODEL)

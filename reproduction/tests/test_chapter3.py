@@ -19,7 +19,7 @@ from reproduction.comparison import judge, verdicts
 from reproduction.page import Picture, Section, page
 from reproduction.statement_tables import markdown, to_csv
 from reproduction.statements import symbols
-from tests.reproduction.pages import by_fact, facts, page_of
+from reproduction.tests.pages import by_fact, facts, page_of
 from tests.tables import rows_of
 
 AXIAL, OFFSET, TENDON = 1.56 * 0.0254, 0.42 * 0.0254, 3.04 * 0.0254

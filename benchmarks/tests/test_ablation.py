@@ -15,7 +15,7 @@ from benchmarks.ablation.without import WEIGHTS, answer
 from pamrs.diagnosis.evidence import weigh
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
 from tests.diagnosis.held import held
-from tests.trial.test_cases import LEAK, key_of
+from trial.tests.test_cases import LEAK, key_of
 
 HEAT = "the hypothesis heat_transfer"
 

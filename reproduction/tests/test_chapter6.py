@@ -10,7 +10,7 @@ import pytest
 
 from reproduction import chapter6, recruiting
 from reproduction.recruiting import CYCLE, Cycles, lifting, plant
-from tests.reproduction.pages import by_fact
+from reproduction.tests.pages import by_fact
 
 #: Statements of which ours differ; one that changes sides must be noticed.
 DIFFER = {

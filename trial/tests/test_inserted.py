@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from tests.trial.test_cases import CREEP, HOSE, LEAK, key_of, result_of
 from trial.__main__ import main
 from trial.inserted import (
     FAILED,
@@ -21,6 +20,7 @@ from trial.inserted import (
     diagnosed,
     truth_of,
 )
+from trial.tests.test_cases import CREEP, HOSE, LEAK, key_of, result_of
 
 
 def told(result: dict[str, Any], *considered: tuple[float | None, float]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from reproduction.__main__ import main
 from reproduction.comparison import KINDS, judge
 from reproduction.page import Picture, Section, page
 from reproduction.summary import counts, summary
-from tests.reproduction.pages import DOCS, facts, page_of
+from reproduction.tests.pages import DOCS, facts, page_of
 from tests.tables import rows_of
 
 ROWS = (
