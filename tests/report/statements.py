@@ -136,7 +136,7 @@ def _of_headlines(found: Diagnosis, page: str, summary: str) -> list[Statement]:
             told.append(Statement("missed", own, source))
         first = "still misses" in text.partition(". ")[0]
         told.append(Statement("missed first", first, source))
-        told.append(Statement("missed first", bool(missed), "answer"))
+        told.append(Statement("missed first", bool(missed and not found.answer.named), "answer"))
     told.append(Statement("headline", found.headline, "headline"))
     told.append(Statement("headline", found.headline * (found.headline in summary), "terminal"))
     return told
@@ -275,5 +275,5 @@ def _of_text(found: Diagnosis) -> list[Statement]:
     if "may lack nothing" not in found.text:
         told.append(Statement("missing", "show no missing physics" not in found.text, "text"))
     if found.answer.missed:
-        told.append(Statement("missing", "still misses" in found.text.partition(". ")[0], "text"))
+        told.append(Statement("missing", "still misses" in found.text, "text"))
     return told

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis
-from pamrs.findings import HEALTHY, EffectFound, EffectParameterFound, Findings, Part
+from pamrs.findings import HEALTHY, EffectFound, EffectParameterFound, Findings, Missed, Part
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
@@ -49,7 +49,7 @@ def title(diagnosis: Findings) -> str:
         told = f"{_listed(names, 2, 'and')} {verb} likely {first.likely}, not {first.said}"
         return f"{told[:1].upper()}{told[1:]}: no physics was judged"
     parts = diagnosis.answer.parts
-    if diagnosis.answer.missed:
+    if diagnosis.answer.missed and not diagnosis.answer.named:
         return words.missed_sentence(diagnosis, 1)
     if not parts:
         wrong = [f"{law.name} is {law.other}, not {law.stated}" for law in diagnosis.laws]
@@ -60,15 +60,16 @@ def title(diagnosis: Findings) -> str:
     others = _listed([_place(part) for part in parts[1:]], 2, "and")
     acts = "in" if all(part.sure for part in parts[1:]) else "may act in"
     end = f"; something else {acts} the {others}" if others else ""
+    end += "".join(f", with {law.name} = {law.other}" for law in diagnosis.laws[:1])
     every = (_phrase(diagnosis, parts[0], most) + end for most in (3, 2, 1))
     short = (told for told in every if len(told.split()) <= LONGEST)
     return next(short, _phrase(diagnosis, parts[0], 0) + end)
 
 
 def headline(diagnosis: Findings) -> str:
-    """The verdict in a few sentences: sensors and commands that are faulty, what the final model
-    still misses, the title with all answers that are left, groups that only fit to within the error
-    of their model, and what was not judged.
+    """The verdict in a few sentences: sensors and commands that are faulty, the title with all
+    answers that are left, what the final model still misses (first where nothing has a name),
+    groups that only fit to within the error of their model, and what was not judged.
 
     Parameters
     ----------
@@ -82,7 +83,10 @@ def headline(diagnosis: Findings) -> str:
     parts = [part for part in parts if not missed or words.searched(part)]
     phrases = [_phrase(diagnosis, part, MOST_RIVALS) for part in parts]
     together = _together(parts, doubt=bool(missed))
-    told = [*filter(None, [missed]), *([together] if together else phrases)] or [title(diagnosis)]
+    phrases = [together] if together else phrases
+    still = [missed] * bool(missed)
+    told = [*phrases, *still] if diagnosis.answer.named else [*still, *phrases]
+    told = told or [title(diagnosis)]
     rest = [*words.within_error(diagnosis), *words.not_judged_words(diagnosis)]
     return ". ".join([*first, *told[:-1], "; ".join([told[-1], *rest])])
 
@@ -189,11 +193,8 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
             for m in diagnosis.misread
         ]
     answer, found = diagnosis.answer, list[tuple[str, str]]()
-    for own in answer.missed[:1]:
-        place = f"in the {words.spoken_name(own.block)}" if own.block else "in the whole rig"
-        what = f"{words.spoken_name(own.channel)} still missed {place}"
-        times = words.format_number(own.noises, 2)
-        found.append((words.sized(own.size, own.unit), f"{what} ({times} × noise)"))
+    still = [_still(own) for own in answer.missed[:1]]
+    found += [] if answer.named else still
     parts = answer.parts[:2]
     for part in parts[:1] if parts and parts[0].group.probabilities else ():
         at = f" in {words.blocks_label(part.group)}" if len(part.group.blocks) > 1 else ""
@@ -216,7 +217,15 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
         model = words.with_article(answer.model)
         what = f"{words.spoken_name(channel)} missed by {model} ({last.size})"
         found.append((f"{words.format_number(last.noises, 2)} × noise", what))
-    return found
+    return found + (still if answer.named else [])
+
+
+def _still(missed: Missed) -> tuple[str, str]:
+    """A channel that the final model still misses: by how much, and where."""
+    place = f"in the {words.spoken_name(missed.block)}" if missed.block else "in the whole rig"
+    times = words.format_number(missed.noises, 2)
+    what = f"{words.spoken_name(missed.channel)} still missed {place} ({times} × noise)"
+    return words.sized(missed.size, missed.unit), what
 
 
 def _missing(part: Part) -> float:

@@ -298,11 +298,11 @@ def considered_sentence(own: Considered) -> str:
 
 def kept_sentence(kept: Unexplained) -> str:
     """What is left in a block: ``the residual of the arm is 15 times the noise level (0.4 deg) on
-    held-out recordings, and nothing that was tried explains it``.
+    held-out recordings, and no name explains it``.
     """
     why = "what is named does not explain it"
     if kept.verdict == "unlisted":
-        why = "nothing that was tried explains it"
+        why = "no name explains it"
     times = format_number(kept.noises, 2, unicode=False)
     on = {"held_out": " on held-out recordings", "fit": " on the fitted recordings"}
     return (

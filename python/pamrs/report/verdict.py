@@ -41,22 +41,23 @@ def unknown_volumes(rig: Rig) -> list[str]:
 
 
 def verdict(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
-    """The verdict in a few sentences: what is still missed, what each group of blocks lacks, why
-    that is not settled, and what was not judged; ``forms`` say what a mismatch without a name is a
-    function of, if that was ``sought``.
+    """The verdict in a few sentences: what each group of blocks lacks, what is still missed (first
+    where nothing has a name), why that is not settled, and what was not judged.
+
+    ``forms`` say what a mismatch without a name is a function of, if that was ``sought``.
     """
     answer, first = diagnosis.answer, diagnosis.answer.parts[:1]
     without = [p for p in answer.parts if p.group.verdict == "unlisted"]
-    main = [f"{missed_sentence(diagnosis)}." if answer.missed else ""]
-    if not first and not answer.missed:
-        main.append(_healthy(diagnosis))
+    still = [f"{missed_sentence(diagnosis, len(answer.missed))}."] * bool(answer.missed)
+    main = [] if first or answer.missed else [_healthy(diagnosis)]
     main += [_effects(diagnosis, case), _mistaken(diagnosis)]
     unexplained = _without_name(diagnosis, without) if without else ""
     if first and first == without[:1]:  # what has no name leads
-        main[1:1], unexplained = [unexplained], ""
+        main, unexplained = [unexplained, *main], ""
     healthy = [p for p in answer.parts if not p.names and p not in without]
     main += [_may_be_complete(part) for part in healthy]
     main += [diagnosis.where.text] if first and first == healthy[:1] else []
+    main = [*main, *still] if answer.named else [*still, *main]
     main.append(unsettled_sentence(diagnosis))
     form = _form(diagnosis, case, forms, sought=sought) if without else ""
     ends = [f"{capital(words)}." for words in not_judged_words(diagnosis)]

@@ -201,7 +201,8 @@ def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGro
     held_table = _table(held, outside, noise_level) if held is not fitted else {}
     budgeted = partial(budget, judged, held, outside, noise_level, nominal)
     known = _known(models)
-    running = partial(free_run, held, outside, nominal, models.final, models.events, known)
+    ending = models.final, models.events, known, noise_level
+    running = partial(free_run, held, outside, nominal, *ending)
     nothing: tuple[list[FreeRun] | None, str, list[Trace]] = (None, "the free run failed", [])
     terms = part("the budget", lambda: budgeted(models.final, models.events), [])
     runs, note, curves = part("the free run", running, nothing)

@@ -17,7 +17,8 @@ from scipy.stats import chi2
 
 from pamrs.channels import channel_of, dotted, recorded_as, unit_of
 from pamrs.diagnosis.fit import Events, Key, Problem, with_known
-from pamrs.diagnosis.prepare import Prepared, Residual
+from pamrs.diagnosis.noise import NoiseLevel
+from pamrs.diagnosis.prepare import Block, Prepared, Residual
 from pamrs.effects import EFFECTS, ports_of
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.findings import FreeRun, FreeRunError, Trace
@@ -80,6 +81,7 @@ def free_run(
     final: Rig,
     events: Events | None,
     known: KnownValues | None = None,
+    noise_level: Mapping[Key, NoiseLevel] | None = None,
 ) -> tuple[list[FreeRun] | None, str, list[Trace]]:
     """Errors of free-running simulations of every recording.
 
@@ -100,6 +102,8 @@ def free_run(
         What happened in single recordings, in the place of what `final` says.
     known : KnownValues, optional
         What is known of the values of `final`; without it no channel is said to be off.
+    noise_level : dict of NoiseLevel, optional
+        By block and recording; that of the sensors alone where there is none.
 
     Returns
     -------
@@ -113,8 +117,8 @@ def free_run(
         recording = prepared.recording
         try:
             there = _with(final, events, recording)
-            run, drawn = _of(prepared, problem, found, nominal, there)
-            runs.append(_judged(run, prepared, there, known))
+            run, drawn = _of(prepared, problem, found, nominal, there, noise_level or {})
+            runs.append(_judged(run, prepared, problem.blocks, there, known))
             missed = max((e.times_before for e in run.channels.values()), default=0.0)
             if missed > most:
                 most, curves = missed, drawn
@@ -137,7 +141,12 @@ def _with(rig: Rig, events: Events | None, recording: Recording) -> Rig:
 
 
 def _of(
-    prepared: Prepared, problem: Problem, found: Stages, nominal: Rig, final: Rig
+    prepared: Prepared,
+    problem: Problem,
+    found: Stages,
+    nominal: Rig,
+    final: Rig,
+    noise_level: Mapping[Key, NoiseLevel],
 ) -> tuple[FreeRun, list[Trace]]:
     """The free run of one recording, and its curves."""
     recording = prepared.recording
@@ -148,6 +157,8 @@ def _of(
     notes = [f"nominal model: {why}"] if why else []
     notes += [f"with what was found: {why_after}"] if why_after and final is not nominal else []
     covering = {b.channel: b.name for b in problem.blocks}
+    known = {c: noise_level.get((block, recording.name)) for c, block in covering.items()}
+    noise = prepared.noise | {c: level.sample for c, level in known.items() if level}
 
     def cut(stage: str, channel: str) -> float | None:
         block = covering.get(recorded_as(channel))
@@ -170,7 +181,7 @@ def _of(
                 after=after.get(channel, math.nan),
                 cut_before=cut("before", channel),
                 cut_after=cut("after", channel),
-                noise=prepared.noise.get(recorded_as(channel)),
+                noise=noise.get(recorded_as(channel)),
             )
             for channel in channels
         },
@@ -182,10 +193,15 @@ def _of(
 def _judged(
     run: FreeRun,
     prepared: Prepared,
+    blocks: Sequence[Block],
     final: Rig,
     known: KnownValues | None,
 ) -> FreeRun:
-    """A free run with what it misses by more than noise and what is known of the values explain."""
+    """A free run with what it misses by more than noise and what is known of the values explain.
+
+    A motion that its block follows from the measured pressures has its miss from the pressures of
+    the run: it is off where one of them is.
+    """
     doubtful = [
         name
         for name, e in run.channels.items()
@@ -203,6 +219,13 @@ def _judged(
         note = f"{note}; {part}" if note else part
     left = _left(prepared, logged, final, known)
     off = {name for name in doubtful if left.get(name, math.inf) > _OFF_NOISES}
+    far = {recorded_as(name) for name in off}
+    drives = {b.channel: far.intersection(b.drives) for b in blocks if b.mechanical}
+    for name in list(off):
+        cut, noise = run.channels[name].cut_after, run.channels[name].noise or 0.0
+        follows = cut is not None and cut <= _OFF_NOISES * noise
+        if follows and not drives.get(recorded_as(name), far):
+            off.discard(name)
     channels = {n: replace(e, off=n in off) for n, e in run.channels.items()}
     return replace(run, channels=channels, note=note)
 
