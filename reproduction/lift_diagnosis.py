@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pamrs.control import AirModel, ArmModel, Feedforward, Fuzzy, Parallel, closed_loop
-from pamrs.control.trajectories import Trajectory, compound, cosine_cycles, degrees
+from pamrs.control.trajectories import Trajectory, cosine_cycles, degrees
 from pamrs.recordings import Case, Recording
 from pamrs.rig import Rig
 from reproduction.lift import (
@@ -24,6 +24,7 @@ from reproduction.lift import (
     plant,
     trajectory,
 )
+from reproduction.waves import compound
 
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis

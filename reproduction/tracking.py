@@ -33,10 +33,11 @@ from pamrs.control import (
     sweep,
 )
 from pamrs.control.metrics import combined, total_curvature
-from pamrs.control.trajectories import Trajectory, compound, lift_hold_return
+from pamrs.control.trajectories import Trajectory, lift_hold_return
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from reproduction.rigs import with_struts
+from reproduction.waves import compound
 
 Array = NDArray[np.float64]
 
@@ -74,11 +75,6 @@ GRIDS: Final[Mapping[str, Mapping[str, tuple[float, ...]]]] = {
     "cascaded PID": {"kp": (3e5, 6e5, 1.2e6), "ki": (1.2e6, 2.4e6, 4.8e6), "kd": (3e4, 6e4, 1e5)},
     "sliding": {"slope": (3.0, 4.5, 6.0), "switching": (1e5, 2e5, 4e5)},
 }
-
-
-def waves(duration: float = 100.0) -> Trajectory:
-    """The compound trajectory (5.24) with Table 5.1."""
-    return compound(duration=duration)
 
 
 def lift() -> Trajectory:
@@ -337,7 +333,7 @@ def tuned(kind: str, payloads: Sequence[float] = PAYLOADS, duration: float = 30.
         name: np.array([gains[name] for _ in payloads for gains in tried]) for name in grid
     }
     done = follow(
-        kind, [plant(payload) for payload in every], arm_model(every), waves(duration), **columns
+        kind, [plant(payload) for payload in every], arm_model(every), compound(duration), **columns
     )
     shape = (len(payloads), len(tried))
     j = combined(done.nu(SETTLED).reshape(shape), done.omega(SETTLED).reshape(shape), axis=1)

@@ -96,9 +96,6 @@ CONTROLLERS = {
     "pid back-calculation": lambda x: PID(1.0 * x, 0.3, 0.05, period=PERIOD, **BACK),
     "pid measured rate": lambda x: PID(2.0, 1.5, 0.2 * x, period=PERIOD, measured_rate=True),
     "fuzzy": lambda x: Fuzzy(1.0 * x, 0.5, 0.5, period=PERIOD, output_filter=0.02),
-    "fuzzy quoted": lambda x: Fuzzy(
-        1.0, 0.5 * x, 0.5 * x, table="quoted", period=PERIOD, output_filter=0.02
-    ),
     "feedforward": lambda x: forward(1.0 * x),
     "feedforward friction": lambda x: forward(
         5.0, FULL.scaled(x), friction=True, pressure_filter=0.01
@@ -122,7 +119,6 @@ CONTROLLERS = {
     "adaptive free": lambda x: follow(
         AdaptiveSliding, SIMPLIFIED, (x, x, x), bounds=None, hold_at_limit=False
     ),
-    "adaptive published": lambda x: follow(AdaptiveSliding.published, SIMPLIFIED, 1, slope=4.0 * x),
     "neural zero": lambda x: follow(Neural, SIMPLIFIED, slope=3.0 * x),
     "neural model": lambda x: follow(Neural, FULL, start="model", gains=(300.0, 2e4, 3e5 * x)),
     "neural gaylord": lambda x: follow(

@@ -260,7 +260,6 @@ def test_wrong_arguments_are_named():
         ("gains", lambda: AdaptiveSliding(SIMPLIFIED, (1.0, 1.0))),
         ("bounds", lambda: AdaptiveSliding(SIMPLIFIED, bounds=[(0.0, 1.0)] * 3)),
         ("bounds = 'some'.* or three pairs", lambda: AdaptiveSliding(SIMPLIFIED, bounds="some")),
-        ("trial", lambda: AdaptiveSliding.published(SIMPLIFIED, 4)),
         ("start", lambda: Neural(SIMPLIFIED, start="other")),
         ("nodes", lambda: Neural(SIMPLIFIED, nodes=1)),
         ("bounds", lambda: Neural(SIMPLIFIED, bounds=(1.0, 1.0, -1.0))),

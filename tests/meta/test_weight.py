@@ -21,9 +21,9 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = {
     ".": 1140,
     "cli": 1380,
-    "control": 4744,
+    "control": 4689,
     "design": 548,
-    "diagnosis": 10833,
+    "diagnosis": 10850,
     "effects": 409,
     "experiments": 1068,
     "findings": 915,
@@ -38,9 +38,9 @@ PACKAGES = {
     "sweeps": 830,
 }
 #: The same of what is not the package.
-ASIDE = {"tests": 29343, "trial": 5358, "reproduction": 4960}
+ASIDE = {"tests": 29350, "trial": 5358, "reproduction": 5010}
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 36217
+MOST = 36179
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -1,14 +1,13 @@
 """What PID and fuzzy control share: the joint as measured, a unit of the angle, volts around the
-closed valve, printed gains.
+closed valve.
 """
 
 from __future__ import annotations
 
 import abc
-from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar, Self
+from collections.abc import Iterable
+from typing import Any
 
-from pamrs._checks import one_of
 from pamrs.control._parts import JointSensor
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed, SampledController
@@ -33,9 +32,6 @@ class OutputFeedback(SampledController):
         If a number is not finite or not allowed; the message names it.
     """
 
-    #: Gains as printed, by name.
-    _PUBLISHED: ClassVar[Mapping[str, Mapping[str, float]]] = {}
-
     unit, limits, null = Fixed(), Fixed(), Fixed()
 
     def __init__(
@@ -57,33 +53,6 @@ class OutputFeedback(SampledController):
             period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
         )
         super().__init__(period, (*gains, *self.sensor.gains))
-
-    @classmethod
-    def published(cls, name: str, **others: Any) -> Self:
-        """With gains as printed, radians and volts (see the class).
-
-        Parameters
-        ----------
-        name : str
-            Of :class:`pamrs.control.PID`: ``feedforward`` (4.4.2, to be used beside a feedforward
-            of kM = 1.0), ``experiment_23kg`` (4.5.1.2, best combined), ``optimal_11kg`` (Fig. 4.9,
-            kP just above 1 and kI near 4). Of :class:`pamrs.control.Fuzzy`: ``optimal_23kg``
-            (4.4.1.2), ``feedforward`` (4.4.2 and Fig. 4.13, beside a feedforward),
-            ``feedforward_gain_series`` (Fig. 4.14).
-        **others
-            The other arguments; for a PID ``anti_windup="none"`` as in the dissertation.
-
-        Returns
-        -------
-        PID or Fuzzy
-
-        Raises
-        ------
-        ParameterError
-            If there is no such set of gains.
-        """
-        one_of("name", name, cls._PUBLISHED)
-        return cls(**{**cls._PUBLISHED[name], "unit": "rad", **others})
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""

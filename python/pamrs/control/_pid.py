@@ -4,22 +4,13 @@ joint angle.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar, Final
+from typing import ClassVar
 
 from pamrs.control._output_feedback import OutputFeedback
 from pamrs.control._parts import Integrator, LowPass
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed, Stateful
 from pamrs.control._values import as_value, clip, limits_around
-
-#: Gains as printed: 4.4.2 (with feedforward, kM 1.0), 4.5.1.2 (best combined at 23 kg), Fig. 4.9
-#: (about, at 11 kg).
-_PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
-    "feedforward": {"kp": 5.0, "ki": 2.0, "kd": 0.0},
-    "experiment_23kg": {"kp": 1.4, "ki": 2.5, "kd": 0.0},
-    "optimal_11kg": {"kp": 1.1, "ki": 4.0, "kd": 0.0},
-}
 
 
 class PIDLaw(Stateful):
@@ -159,7 +150,6 @@ class PID(OutputFeedback):
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("law", "sensor")
-    _PUBLISHED = _PRINTED
 
     kp, ki, kd = Fixed("law.kp"), Fixed("law.ki"), Fixed("law.kd")
     output_filter = Fixed("law.output_filter")
