@@ -226,10 +226,10 @@ def _rig_alone() -> list[Comparison]:
     pressure = rig.parameter("supply.initial_pressure").value
     most = hold(rig, pressure=pressure, to=math.radians(lift.HIGH)).payload_limit or 0.0
     small = FUZZY_SETS.index("NS"), FUZZY_SETS.index("PS")
-    centres = [float(3.0 * rules[small]) for rules in (fuzzy_rules(), quoted_rules())]
+    standard, quoted = (float(3.0 * rules[small]) for rules in (fuzzy_rules(), quoted_rules()))
     return [
         say("holds_50", most, lift.HIGH, 1e-6 * pressure),
-        say("quoted_rule", *centres),
+        say("quoted_rule", standard, quoted),
     ]
 
 

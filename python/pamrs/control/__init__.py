@@ -2,8 +2,6 @@
 tuning and stability.
 """
 
-from __future__ import annotations
-
 from pamrs.control import (
     iosystem,
     linear,

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array
 from pamrs.channels import dotted
 from pamrs.control._groups import Group, check_single, groups_of
 from pamrs.control._protocol import Value
@@ -24,7 +24,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-Array = NDArray[np.float64]
 
 # pressure ratio above which the orifice law is a line (physics reference, section 3)
 _LAMINAR: Final = 0.999

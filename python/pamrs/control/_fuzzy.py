@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import ClassVar, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs.control._output_feedback import OutputFeedback
 from pamrs.control._parts import LowPass
 from pamrs.control._protocol import Measurement, Reference, Value
@@ -22,7 +22,7 @@ FUZZY_SETS: Final = ("NB", "NM", "NS", "ZE", "PS", "PM", "PB")
 _HALF: Final = 3  # sets on each side of zero
 
 
-def fuzzy_rules(table: ArrayLike | None = None) -> NDArray[np.float64]:
+def fuzzy_rules(table: ArrayLike | None = None) -> Array:
     """Centre of the output set for each pair of sets.
 
     Table 4.1 is printed as a picture; the standard table is used, output index
@@ -58,7 +58,7 @@ def fuzzy_rules(table: ArrayLike | None = None) -> NDArray[np.float64]:
 
 
 def fuzzy_surface(
-    error: Value, rate: Value, rules: Sequence[Sequence[float]], rules_array: NDArray[np.float64]
+    error: Value, rate: Value, rules: Sequence[Sequence[float]], rules_array: Array
 ) -> Value:
     """Output of the rules for scaled inputs, before h.
 
@@ -110,9 +110,7 @@ def fuzzy_surface(
     return _surface(places[0], places[1], rules_array)
 
 
-def _surface(
-    x: NDArray[np.float64], y: NDArray[np.float64], rules_array: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _surface(x: Array, y: Array, rules_array: Array) -> Array:
     """The same for arrays of places among the sets, 0 to 6."""
     i, j = np.minimum(x.astype(np.intp), 5), np.minimum(y.astype(np.intp), 5)
     a, b = x - i, y - j

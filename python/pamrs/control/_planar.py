@@ -19,8 +19,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import finite, refused
 from pamrs.control._groups import highest_pressure, joints_of
 from pamrs.control._model import JointModel, Parameter
@@ -31,8 +31,6 @@ from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
-
-Array = NDArray[np.float64]
 
 
 class JointTorques:

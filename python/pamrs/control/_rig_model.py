@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import one_of
 from pamrs.control._adaptive import AdaptiveSliding
 from pamrs.control._air import AirModel
@@ -26,7 +26,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-Array = NDArray[np.float64]
 _CROSSOVER: Final = 110.0  # 1/s, that of the shoulder's pressure loop with its default gains
 _RESET: Final = 1.0  # 1/s, ki/kp of the same
 #: I [kg m2] and I/C1 of the shoulder with its payload, at mid-range.

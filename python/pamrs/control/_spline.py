@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.control._protocol import Value
 
 
@@ -20,7 +20,7 @@ class Spline:
         Values at k >= 4 even places.
     """
 
-    def __init__(self, low: float, high: float, values: NDArray[np.float64]) -> None:
+    def __init__(self, low: float, high: float, values: Array) -> None:
         from scipy.interpolate import CubicSpline
 
         self.low, self.high, self.cells = float(low), float(high), values.size - 1
@@ -60,7 +60,7 @@ class Spline:
         places, (ka, kb, kc, _) = self._find(np.asarray(place))
         return np.asarray((3.0 * ka * places + 2.0 * kb) * places + kc)
 
-    def _find(self, place: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _find(self, place: Array) -> tuple[Array, Array]:
         x = np.minimum(np.maximum(place, self.low), self.high) - self.low
         cell = np.minimum((x / self._step).astype(np.intp), self.cells - 1)
         return x - cell * self._step, self._coefficients[cell].T

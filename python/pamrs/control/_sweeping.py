@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike, Mask
 from pamrs.control._groups import lengths_of
 from pamrs.control._loop import Actuation, actuation_of, measured_by, tracked_of
 from pamrs.control._protocol import Controller, check_controller
@@ -22,8 +22,6 @@ from pamrs.simulation import default_step, whole_samples
 
 if TYPE_CHECKING:
     from pamrs.simulation import BatchRun
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Sweep:
     rms: Array
     largest: Array
     final: Array
-    failed: NDArray[np.bool_]
+    failed: Mask
     run: BatchRun = field(repr=False)
     trajectory: Trajectory
     unit: str

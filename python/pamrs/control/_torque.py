@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import check_names, one_of
 from pamrs.channels import dotted
 from pamrs.control._groups import Group, beyond_sine, check_single, groups_of, highest_pressure
@@ -26,7 +26,6 @@ from pamrs.rig import Joint
 if TYPE_CHECKING:
     from pamrs.rig import Muscle, Rig
 
-Array = NDArray[np.float64]
 
 # of a table over the joint's range; makes its error some 1e-9 of the largest value
 _NODES: Final = 1025

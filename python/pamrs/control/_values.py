@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import (
     as_column,
     as_numbers,
@@ -23,7 +23,6 @@ from pamrs._checks import (
 from pamrs.control._protocol import Value
 from pamrs.errors import ParameterError
 
-Times = NDArray[np.float64]
 #: How many of a unit are in a radian.
 _PER_RADIAN: Final[dict[str, float]] = {"rad": 1.0, "deg": 180.0 / math.pi}
 
@@ -85,7 +84,7 @@ def gains_of(names: Sequence[str], gains: Sequence[Any]) -> tuple[Value, ...]:
     return tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
 
 
-def times_of(values: Any, least: int) -> Times:
+def times_of(values: Any, least: int) -> Array:
     """Rising times [s], ``least`` of them or more; a ParameterError for anything else."""
     (times,) = matched(time=as_column("time", values))
     if times.size < least:

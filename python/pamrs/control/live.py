@@ -19,8 +19,8 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import rising, whole
 from pamrs._termination import Termination
 from pamrs.control._live_commands import Command, LiveCommands
@@ -32,7 +32,6 @@ from pamrs.simulation import whole_samples
 
 __all__ = ["Clock", "Device", "LiveError", "LiveRun", "SystemClock", "run_live"]
 
-Array = NDArray[np.float64]
 
 _SAFE_ATTEMPTS: Final = 3
 

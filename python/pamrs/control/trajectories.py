@@ -19,8 +19,8 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, finite, matched, misshapen, positive, quantities, whole
 from pamrs.control._protocol import Reference
 from pamrs.control._values import times_of
@@ -37,7 +37,6 @@ __all__ = [
     "step",
 ]
 
-Array = NDArray[np.float64]
 
 #: No joint of a rig turns farther either way [rad].
 MOST_ANGLE = 7.0

@@ -13,8 +13,6 @@ needs.
 True
 """
 
-from __future__ import annotations
-
 from pamrs.design import sizing
 from pamrs.design._filling import Filling
 from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, least_pressure, optimise

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import one_of, positive, whole
 from pamrs.design._filling import Filling
 from pamrs.errors import ParameterError
@@ -33,7 +33,6 @@ __all__ = [
     "size",
 ]
 
-Array = NDArray[np.float64]
 
 _LEAST_WORKING_PRESSURE: Final = 2e3  # [Pa], below which a working pressure is a mistake of unit
 _RULES: Final[dict[str, tuple[str, bool]]] = {  # criterion: (key, larger is better)

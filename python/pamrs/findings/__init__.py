@@ -12,8 +12,6 @@ of what it has; `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
 become JSON, and `fields_from`, which reads it.
 """
 
-from __future__ import annotations
-
 from pamrs.findings._answer import (
     MENDED,
     MOST_MISSED,

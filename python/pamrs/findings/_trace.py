@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from pamrs._arrays import Array
 
 
 class ModelFile(Protocol):
@@ -48,16 +47,16 @@ class Trace:
     role: str
     channel: str
     unit: str
-    time: FloatArray
-    measured: FloatArray
-    before: FloatArray
-    refit: FloatArray | None = None
-    after: FloatArray | None = None
-    residual_before: FloatArray | None = None
-    residual_after: FloatArray | None = None
+    time: Array
+    measured: Array
+    before: Array
+    refit: Array | None = None
+    after: Array | None = None
+    residual_before: Array | None = None
+    residual_after: Array | None = None
 
     def __post_init__(self) -> None:
-        def put(name: str, array: FloatArray) -> None:
+        def put(name: str, array: Array) -> None:
             object.__setattr__(self, name, array)
 
         put("time", np.asarray(self.time, dtype=np.float64))

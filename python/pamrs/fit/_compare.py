@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import refused
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._cautions import FAR
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
 _NEAR: Final = 1.25  # times the best leave-one-pressure-out error, for a recommendation
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index
 from pamrs.fit._estimate import Estimate, Problem
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 _FEWEST_LEVELS = 5
 

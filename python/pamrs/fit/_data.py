@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from pamrs._arrays import Array, ArrayLike, Index, Mask
 from pamrs._checks import positive, quantities, refused
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._checks import (
@@ -29,9 +30,6 @@ from pamrs.fit._ways import table_ways
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
 
 #: Reason of the rows that :meth:`ForceMap.select` leaves out.
 LEFT_OUT: Final = "left out"

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index, Mask
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._design import Design, friction_factor
 from pamrs.fit._problem import decompose, project_out, solve
@@ -19,9 +19,6 @@ from pamrs.fit._problem import decompose, project_out, solve
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 _SIGMA_ROUNDS = 30
 _STEP = 1e-4  # of a scale, for differences

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Mask
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.fit._bench import from_recording
 from pamrs.fit._data import ForceMap
@@ -27,8 +27,6 @@ from pamrs.recordings.table import (
     stem_of,
 )
 from pamrs.units import parse_unit, same_dimension, to_si
-
-Array = NDArray[np.float64]
 
 # channel -> SI unit
 _UNITS: Final = {
@@ -357,7 +355,7 @@ def _cells(table: Table, heading: str, source: str) -> list[str]:
 
 def _kept(
     table: Table, where: Mapping[str, str], decimal: str, source: str
-) -> tuple[NDArray[np.bool_], list[str]]:
+) -> tuple[Mask, list[str]]:
     """Rows that ``where`` asks for, and a note about the others."""
     keep = np.ones(len(table.row_numbers), dtype=bool)
     for heading, value in where.items():

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index, Mask
 from pamrs._checks import contraction_of, matched, refused
 from pamrs._views import Panels, View
 from pamrs.errors import RecordingError
@@ -27,7 +28,6 @@ from pamrs.fit._data import ForceMap
 if TYPE_CHECKING:
     from pamrs.rig import Muscle, Rig
 
-Array = NDArray[np.float64]
 
 _MOST_LEVELS: Final = 24
 """Pressure levels that are nodes themselves; of more, as in a ramp, this many are taken."""
@@ -323,7 +323,7 @@ def _table(pressure: Array, contraction: Array, gas: Array, e: Array, pull: Arra
     return np.column_stack([_isotonic(column, trust) for column in falling.T])
 
 
-def _place(axis: Array, values: Array) -> tuple[NDArray[np.intp], Array]:
+def _place(axis: Array, values: Array) -> tuple[Index, Array]:
     """Interval of each value, and where in it."""
     cell = np.clip(np.searchsorted(axis, values, side="right") - 1, 0, len(axis) - 2)
     return cell, (values - axis[cell]) / (axis[cell + 1] - axis[cell])
@@ -361,7 +361,7 @@ def _isotonic(values: Array, weights: Array) -> Array:
     return np.repeat(means, counts)
 
 
-def _branches(way: NDArray[np.int8]) -> list[NDArray[np.bool_]]:
+def _branches(way: NDArray[np.int8]) -> list[Mask]:
     """Rows of either direction, where most have one; else all rows."""
     both = [way < 0, way > 0]
     if min(rows.sum() for rows in both) >= _SHARE * len(way):

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.errors import FitError
-
-Array = NDArray[np.float64]
 
 #: Ratio of the smallest to the largest singular value below which columns count as collinear.
 RANK_TOLERANCE = 1e-10

@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Mask
 from pamrs._checks import one_of, refused
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._cautions import cautions
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
     from pamrs.rig import Muscle
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Geometry that can be fitted, and its unit.
 GEOMETRY: Final[dict[str, str]] = {

@@ -12,9 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pamrs._arrays import stretches
+from pamrs._arrays import Array, Mask, stretches
 from pamrs._checks import quantities
 from pamrs._files import MOST_NAME, shown
 from pamrs._tables import Columns, Tabular
@@ -31,9 +30,6 @@ from pamrs.units import in_words
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 _FEW: Final = 20

@@ -7,8 +7,6 @@ keys that a rig file may have, :mod:`pamrs.rig.muscle_models` lists the force mo
 rig.
 """
 
-from __future__ import annotations
-
 from pamrs.rig._checks import muscle_problems
 from pamrs.rig._choices import OtherChoice, other_choices
 from pamrs.rig._joint import Joint

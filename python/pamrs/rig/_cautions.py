@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.rig._ports import Ports
 from pamrs.rig._units import Units
 from pamrs.rig.schema import qualified, split_name, tables_of
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from pamrs.rig._muscle import Muscle
     from pamrs.rig._rig import Parameter
 
-Array = NDArray[np.float64]
 
 _PATHS = {"fill": ("fill",), "vent": ("vent",), "closed": (), "either": ("fill", "vent")}
 """Paths that are open in each position of a spool that switches."""

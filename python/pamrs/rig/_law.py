@@ -6,13 +6,11 @@ from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import positive, rising
 from pamrs.errors import ParameterError
-
-Array = NDArray[np.float64]
 
 _FIRST: Final = (9, 13)
 _MOST: Final = (200, 400)

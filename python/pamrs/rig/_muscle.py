@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, ArrayLike, Mask
 from pamrs._checks import (
     as_numbers,
     checked_number,
@@ -26,7 +26,6 @@ from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
 from pamrs.rig.schema import keys_of
 
-Array = NDArray[np.float64]
 _LISTS = (
     *("modulus_slope", "modulus_offset", "extension_factors"),
     *("map_pressure", "map_contraction", "map_force"),
@@ -398,7 +397,7 @@ class Muscle:
         """
         return self._over(self._core.circumferential_strain, contraction)
 
-    def braid_taut(self, contraction: ArrayLike) -> NDArray[np.bool_]:
+    def braid_taut(self, contraction: ArrayLike) -> Mask:
         """Whether the radius has reached its floor in extension; arguments and errors as
         :meth:`radius`.
 

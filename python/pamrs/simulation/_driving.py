@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, by_hand, doubt_pascals, misshapen, one_of, refused
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.errors import ParameterError, meant
@@ -19,7 +19,6 @@ from pamrs.simulation._plants import rowwise
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-Array = NDArray[np.float64]
 #: One array for a block without a name or the only one of its kind, else one for each name.
 Signals = ArrayLike | Mapping[str, ArrayLike]
 
@@ -342,11 +341,6 @@ def has_frame(rig: Rig) -> bool:
 def regulators_of(rig: Rig) -> list[str]:
     """Names of the supplies that are regulators."""
     return [name for name, table in rig.tables("supply").items() if table["kind"] == "regulator"]
-
-
-def switching_valves(rig: Rig) -> list[str]:
-    """Names of the valves that switch."""
-    return [name for name, table in rig.tables("valve").items() if table["spool"] == "switching"]
 
 
 def sensor_zero(rig: Rig, kind: str, key: str, block: str) -> float:

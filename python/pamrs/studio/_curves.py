@@ -6,15 +6,15 @@ from typing import Final
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._views import decimate
 
 _WIDTH: Final = 240
 _HEIGHT: Final = 36
 
 
-def sparkline(values: NDArray[np.float64]) -> Markup:
+def sparkline(values: Array) -> Markup:
     """A curve over the samples, from the smallest to the largest value of each stretch.
 
     Parameters

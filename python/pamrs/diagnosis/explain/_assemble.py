@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
@@ -70,9 +69,6 @@ _LEAST_GAP = 0.05
 _DETERMINED_SHARE = 0.7
 # [standard deviations] moved, from which a parameter counts as determined too
 _DETERMINED_MOVE = 2.0
-
-
-Array = NDArray[np.float64]
 
 
 def assemble(

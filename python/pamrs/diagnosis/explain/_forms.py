@@ -7,16 +7,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.diagnosis.fit import Fit, Problem
 from pamrs.diagnosis.prepare import Block, begun
 from pamrs.effects import CLOSURE_OF, CLOSURE_TERMS, MEMORY_OF
 from pamrs.errors import DiagnosisError
 from pamrs.findings import Form
 from pamrs.simulation import core_rig, default_step
-
-Array = NDArray[np.float64]
 
 
 def forms_of(found: Fit, problem: Problem, baseline: Fit) -> list[Form]:

@@ -15,8 +15,6 @@ is known of all parameters); `ends_in_tolerances`,
 (standard deviations of coloured residuals).
 """
 
-from __future__ import annotations
-
 from pamrs.diagnosis.fit._acting import (
     acts_in,
     concerns,

@@ -13,9 +13,9 @@ from threading import Event
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array
 from pamrs._losses import Losses
 from pamrs.diagnosis.fit._acting import acts_in, core_names, depends
 from pamrs.diagnosis.fit._held import known_parameters, with_known
@@ -49,7 +49,6 @@ _LAST_STEPS = 2  # of which one left the range, where a fit was stopped there: i
 FIT_BIN_TIME = 0.02  # [s] bins of residuals for fits: faster than any effect of the catalogue shows
 
 
-Array = NDArray[np.float64]
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 Key = tuple[str, str]

@@ -6,11 +6,9 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.diagnosis.prepare import Residual
-
-Array = NDArray[np.float64]
 
 
 def lines_of(

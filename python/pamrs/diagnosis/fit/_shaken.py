@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.diagnosis.fit._acting import acts_in
 from pamrs.diagnosis.fit._fitting import Events, Key, Problem, changes, stacked
 from pamrs.diagnosis.fit._lines import lines_of
@@ -21,9 +21,6 @@ from pamrs.rig import Rig
 
 # lines of the spectrum tried for a vibration: two that shake, and what the drive leaves
 _MOST_LINES = 5
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, significant
 from pamrs.diagnosis.fit import (
@@ -39,7 +39,6 @@ from pamrs.rig import Parameter, Rig
 _BUDGET_DRAWS = 400
 
 
-Array = NDArray[np.float64]
 Stages = dict[str, dict[Key, Residual]]
 Residuals = dict[Key, Residual]
 

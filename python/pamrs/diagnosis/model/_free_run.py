@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2
 
+from pamrs._arrays import Array
 from pamrs.channels import channel_of, dotted, recorded_as, unit_of
 from pamrs.diagnosis.fit import Events, Key, Problem, with_known
 from pamrs.diagnosis.prepare import Prepared, Residual
@@ -40,9 +40,6 @@ _OFF_ROWS = 2000
 _OFF_SAMPLES = 200_000
 # steps in which values as likely as that are looked for by which the whole rig misses less
 _OFF_STEPS = 2
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

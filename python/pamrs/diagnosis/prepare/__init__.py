@@ -17,8 +17,6 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 that do not push back).
 """
 
-from __future__ import annotations
-
 from pamrs.diagnosis.prepare._ambient import AMBIENT, AMBIENT_PRESSURE, at_ambient
 from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
 from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings, said_of_warm_starts

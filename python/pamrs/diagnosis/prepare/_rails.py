@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from pamrs._arrays import Mask
 from pamrs.findings import Faulty
 from pamrs.recordings import Recording
 from pamrs.units import parse_unit
 
 # samples beside one at its sensor's end, masked as well: their noise is cut off on one side
 _RAIL_SAMPLES = 3
-
-
-Array = NDArray[np.float64]
 
 
 def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Faulty]]:
@@ -62,7 +59,7 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
     return found, said
 
 
-def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> NDArray[np.bool_]:
+def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> Mask:
     """Samples of a channel at the end of its range, and those beside them; those that are masked
     because they stay there included.
     """
@@ -78,11 +75,11 @@ def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> NDA
             # what is reported of several stretches together lies anywhere between its ends
             between = (recording.time >= issue.start) & (recording.time <= issue.stop)
             there |= between & ~mask
-    bad: NDArray[np.bool_] = binary_dilation(there, iterations=beside) if there.any() else there
+    bad: Mask = binary_dilation(there, iterations=beside) if there.any() else there
     return bad
 
 
-def _masked(recording: Recording, channel: str, bad: NDArray[np.bool_]) -> Recording:
+def _masked(recording: Recording, channel: str, bad: Mask) -> Recording:
     values = np.where(bad, np.nan, recording.channels[channel])
     mask = recording.mask[channel] & ~bad
     return replace(
