@@ -19,28 +19,28 @@ ROOT = Path(__file__).parents[2]
 
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
-    ".": 1143,
+    ".": 1108,
     "cli": 1380,
-    "control": 4672,
+    "control": 4702,
     "design": 544,
-    "diagnosis": 10806,
+    "diagnosis": 10792,
     "effects": 408,
     "experiments": 1060,
     "findings": 911,
-    "fit": 3011,
+    "fit": 2989,
     "library": 71,
-    "recordings": 4891,
+    "recordings": 4884,
     "report": 2121,
     "rig": 2253,
     "rigs": 139,
     "simulation": 1099,
-    "studio": 681,
+    "studio": 663,
     "sweeps": 825,
 }
 #: The same of what is not the package.
 ASIDE = {"tests": 29326, "trial": 5358, "reproduction": 5010}
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 36015
+MOST = 35949
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

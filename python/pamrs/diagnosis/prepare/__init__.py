@@ -41,7 +41,7 @@ from pamrs.diagnosis.prepare._plausible import (
     without_dead_commands,
     without_impossible,
 )
-from pamrs.diagnosis.prepare._rails import without_rails
+from pamrs.diagnosis.prepare._rails import without_poor_thermometers, without_rails
 from pamrs.diagnosis.prepare._signals import (
     Prepared,
     binned,
@@ -54,7 +54,6 @@ from pamrs.diagnosis.prepare._signals import (
     warm_chambers,
 )
 from pamrs.diagnosis.prepare._slack import said_of_slack
-from pamrs.diagnosis.prepare._thermometers import without_poor_thermometers
 from pamrs.diagnosis.prepare._units import noted_units, suspected_units
 from pamrs.diagnosis.prepare._unread import (
     blocks_beside_tanks,
