@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.control import FUZZY_SETS, PID, fuzzy_rules, metrics
+from pamrs.control import PID, fuzzy_rules, metrics
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from reproduction import lift
@@ -225,7 +225,7 @@ def _rig_alone() -> list[Comparison]:
     rig = lift.assumed()
     pressure = rig.parameter("supply.initial_pressure").value
     most = hold(rig, pressure=pressure, to=math.radians(lift.HIGH)).payload_limit or 0.0
-    small = FUZZY_SETS.index("NS"), FUZZY_SETS.index("PS")
+    small = 2, 4  # of NB, NM, NS, ZE, PS, PM, PB: error NS, rate PS
     standard, quoted = (float(3.0 * rules[small]) for rules in (fuzzy_rules(), quoted_rules()))
     return [
         say("holds_50", most, lift.HIGH, 1e-6 * pressure),

@@ -161,7 +161,7 @@ class Plan:
             if start == "15 lb":
                 weights = {name: values[1] for name, values in taught.items()}
             else:
-                arm = arm_model([payload], torque="gaylord" if start == "Gaylord" else "simplified")
+                arm = arm_model([payload], guessed=start == "Gaylord")
                 outer = controller("neural", arm, start="model").outer
                 assert isinstance(outer, Neural)
                 weights = outer.weights

@@ -9,7 +9,7 @@ import pytest
 
 from pamrs.control import AdaptiveSliding, Cascade, Neural, Reference, Sliding, fuzzy_rules
 from pamrs.errors import ParameterError
-from tests.control.cases import FULL, GAYLORD, PERIOD, SIMPLIFIED, samples, singles
+from tests.control.cases import FULL, PERIOD, SIMPLIFIED, samples, singles
 from tests.simulation.refusals import refused
 
 LAMBDA, KD = 5.0, 2e4
@@ -199,7 +199,7 @@ def test_the_start_from_the_model_is_the_sliding_law():
     (5.17)-(5.19).
     """
     still = {"start": "model", "nodes": 10, "gains": (0.0, 0.0, 0.0)}
-    for arm in (SIMPLIFIED, FULL, GAYLORD):
+    for arm in (SIMPLIFIED, FULL):
         neural = sharp(Neural, arm, boundary_layer=0.2, **still)
         sliding = sharp(Sliding, arm, boundary_layer=0.2)
         for k, angle in enumerate(neural.angles[2:8].tolist()):

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = {
     ".": 1108,
     "cli": 1380,
-    "control": 4702,
+    "control": 4662,
     "design": 544,
     "diagnosis": 10792,
     "effects": 408,
@@ -38,9 +38,9 @@ PACKAGES = {
     "sweeps": 825,
 }
 #: The same of what is not the package.
-ASIDE = {"tests": 29326, "trial": 5358, "reproduction": 5010}
+ASIDE = {"tests": 29322, "trial": 5358, "reproduction": 5043}
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35949
+MOST = 35909
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -16,9 +16,8 @@ from pamrs.control._adaptive import AdaptiveSliding
 from pamrs.control._air import AirModel, ConductanceInverse, OrificeInverse
 from pamrs.control._cascade import Cascade, PressureLoop, cascaded_pid
 from pamrs.control._feedforward import Feedforward, FeedforwardPressure, Parallel
-from pamrs.control._fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
+from pamrs.control._fuzzy import Fuzzy, fuzzy_rules, fuzzy_surface
 from pamrs.control._hysteresis import (
-    DeadZoneCompensation,
     HysteresisCompensation,
     HystereticTorque,
     SlipMemory,
@@ -42,7 +41,6 @@ from pamrs.control._sweeping import Sweep, sweep
 from pamrs.control._torque import (
     BundleTorque,
     FullTorque,
-    GaylordTorque,
     GroupTorque,
     OpposedTorque,
     SimplifiedTorque,
@@ -58,7 +56,6 @@ from pamrs.control.tuning import GainMap
 __all__ = [
     "ANTI_WINDUP",
     "Actuation",
-    "FUZZY_SETS",
     "NETWORKS",
     "PID",
     "AdaptiveSliding",
@@ -85,14 +82,12 @@ __all__ = [
     "ClosedLoop",
     "ConductanceInverse",
     "Controller",
-    "DeadZoneCompensation",
     "Device",
     "Feedforward",
     "FilteredDerivative",
     "FullTorque",
     "Fuzzy",
     "GainMap",
-    "GaylordTorque",
     "HysteresisCompensation",
     "HystereticTorque",
     "Integrator",

@@ -17,9 +17,7 @@ from pamrs.control._sampled import Fixed
 from pamrs.control._values import as_value, clip, positive_gain
 from pamrs.errors import ParameterError
 
-FUZZY_SETS: Final = ("NB", "NM", "NS", "ZE", "PS", "PM", "PB")
-"""Names of the sets, centres -1, -2/3, ... 1."""
-_HALF: Final = 3  # sets on each side of zero
+_HALF: Final = 3  # sets on each side of zero, NB, NM, NS, ZE, PS, PM, PB
 
 
 def fuzzy_rules(table: ArrayLike | None = None) -> Array:

@@ -190,7 +190,7 @@ class ArmModel(JointModel):
         rig : Rig
             With muscles, joint and a one-link arm; one of several links has a
             :class:`pamrs.control.PlanarArmModel`.
-        torque : {"full", "simplified", "gaylord"} or TorqueModel
+        torque : {"full", "simplified"} or TorqueModel
             Which torque model; of several muscles the full one.
         pressure_limit : float, optional
             [Pa]; by default the initial pressure of the supply, or ``max_pressure`` of ``[limits]``

@@ -52,8 +52,7 @@ class Neural(SlidingController):
     ----------
     arm : JointModel
         Gives range and pressure limit and, with ``start="model"``, the start: ``H = I/C1``,
-        ``C = b/C1``, ``G = (m g r sin - C2)/C1`` (5.17)-(5.19). With the torque ``"gaylord"`` that
-        is the educated guess of (5.25).
+        ``C = b/C1``, ``G = (m g r sin - C2)/C1`` (5.17)-(5.19).
     start : {"zero", "model"}
         What the networks know at first.
     nodes : int
