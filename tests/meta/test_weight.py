@@ -19,28 +19,28 @@ ROOT = Path(__file__).parents[2]
 
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
-    ".": 1108,
-    "cli": 1380,
-    "control": 4662,
-    "design": 544,
-    "diagnosis": 10792,
+    ".": 1107,
+    "cli": 1378,
+    "control": 4622,
+    "design": 532,
+    "diagnosis": 10857,
     "effects": 408,
     "experiments": 1060,
-    "findings": 911,
-    "fit": 2989,
+    "findings": 906,
+    "fit": 2965,
     "library": 71,
-    "recordings": 4884,
-    "report": 2121,
-    "rig": 2253,
+    "recordings": 4882,
+    "report": 2035,
+    "rig": 2238,
     "rigs": 139,
-    "simulation": 1099,
+    "simulation": 1095,
     "studio": 663,
-    "sweeps": 825,
+    "sweeps": 817,
 }
 #: The same of what is not the package.
 ASIDE = {"tests": 29322, "trial": 5358, "reproduction": 5043}
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35909
+MOST = 35775
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

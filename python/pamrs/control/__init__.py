@@ -13,7 +13,7 @@ from pamrs.control import (
     tuning,
 )
 from pamrs.control._adaptive import AdaptiveSliding
-from pamrs.control._air import AirModel, ConductanceInverse, OrificeInverse
+from pamrs.control._air import AirModel, ConductanceInverse, FlowInverse, OrificeInverse, SetPoint
 from pamrs.control._cascade import Cascade, PressureLoop, cascaded_pid
 from pamrs.control._feedforward import Feedforward, FeedforwardPressure, Parallel
 from pamrs.control._fuzzy import Fuzzy, fuzzy_rules, fuzzy_surface
@@ -47,7 +47,6 @@ from pamrs.control._torque import (
     TorqueModel,
     torque_line,
 )
-from pamrs.control._ways import FlowInverse, SetPoint
 from pamrs.control.live import Device, LiveError, LiveRun, SystemClock, run_live
 from pamrs.control.metrics import Metrics
 from pamrs.control.trajectories import Trajectory

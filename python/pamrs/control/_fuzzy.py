@@ -10,8 +10,8 @@ from typing import ClassVar, Final
 import numpy as np
 
 from pamrs._arrays import Array, ArrayLike
-from pamrs.control._output_feedback import OutputFeedback
 from pamrs.control._parts import LowPass
+from pamrs.control._pid import OutputFeedback
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed
 from pamrs.control._values import as_value, clip, positive_gain

@@ -18,20 +18,17 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from pamrs._checks import one_of, positive
 from pamrs.control._protocol import Controller, Measurement, Reference, Value
 from pamrs.control._sampled import Restorer, SampledController, Stateful
-from pamrs.control._spline import Spline
 from pamrs.control._torque import TorqueModel, _parts
-from pamrs.control._values import clip
+from pamrs.control._values import Spline, clip
 from pamrs.errors import ParameterError
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
+from pamrs.rig import Rig
 
 _SHARE: Final = (0.125, 0.25, 0.5, 1.0)  # of the presliding distance, by element, as in the core
 _LEAST: Final = 0.05  # of C1 without friction that stays in any case

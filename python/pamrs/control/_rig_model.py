@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,9 +22,7 @@ from pamrs.control._protocol import Controller
 from pamrs.control._sliding import Sliding
 from pamrs.control._torque import GroupTorque, TorqueModel, active_groups, group_torques
 from pamrs.errors import ParameterError
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
+from pamrs.rig import Rig
 
 _CROSSOVER: Final = 110.0  # 1/s, that of the shoulder's pressure loop with its default gains
 _RESET: Final = 1.0  # 1/s, ki/kp of the same

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +18,7 @@ from pamrs.control.metrics import slope_sine
 from pamrs.control.trajectories import Trajectory, check_reach
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import default_step, whole_samples
-
-if TYPE_CHECKING:
-    from pamrs.simulation import BatchRun
+from pamrs.simulation import Batch, BatchRun, default_step, whole_samples
 
 
 @dataclass(frozen=True)
@@ -138,8 +135,6 @@ def sweep(
     ParameterError
         If times, lengths or names do not fit together.
     """
-    from pamrs.simulation import Batch
-
     factor = angle_factor(unit)
     check_controller(controller)
     period = controller.period

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 
@@ -18,14 +18,9 @@ from pamrs._checks import check_names, one_of
 from pamrs.channels import dotted
 from pamrs.control._groups import Group, beyond_sine, check_single, groups_of, highest_pressure
 from pamrs.control._protocol import Value
-from pamrs.control._spline import Spline
-from pamrs.control._values import clip, positive_gain, where
+from pamrs.control._values import Spline, clip, positive_gain, where
 from pamrs.errors import ParameterError
-from pamrs.rig import Joint
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle, Rig
-
+from pamrs.rig import Joint, Muscle, Rig
 
 # of a table over the joint's range; makes its error some 1e-9 of the largest value
 _NODES: Final = 1025

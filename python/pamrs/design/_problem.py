@@ -7,18 +7,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from pamrs._arrays import Array, ArrayLike, Mask
 from pamrs._checks import check_names, one_of, positive, refused, whole
 from pamrs.errors import ParameterError
-from pamrs.rig import Joint
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
+from pamrs.rig import Joint, Muscle
 
 #: The four lengths, in the order of a design's columns.
 LENGTHS: Final = ("upper_axial", "upper_offset", "lower_axial", "lower_offset")

@@ -67,9 +67,8 @@ from pamrs.findings._entries import (
     WrongParameter,
 )
 from pamrs.findings._entry import Entry, fields_from, to_plain
-from pamrs.findings._findings import Findings
+from pamrs.findings._findings import Findings, ModelFile, Trace
 from pamrs.findings._missing import MissingInput, MissingRecording, shown_unit
-from pamrs.findings._trace import ModelFile, Trace
 
 __all__ = [
     "HEALTHY",

@@ -8,17 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from pamrs._arrays import Array, Index, Mask
 from pamrs.errors import ParameterError, RecordingError
+from pamrs.rig import Muscle
 from pamrs.units import in_words, parse_unit
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
 
 PRESSURE_HIGH: Final = 5e6  # [Pa]; a map whose pressures lie beyond is in another unit
 _PRESSURE_LOW: Final = 2e3

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,7 @@ from pamrs.fit._checks import (
     reachable,
 )
 from pamrs.fit._ways import table_ways
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
+from pamrs.rig import Muscle
 
 #: Reason of the rows that :meth:`ForceMap.select` leaves out.
 LEFT_OUT: Final = "left out"

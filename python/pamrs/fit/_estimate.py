@@ -7,17 +7,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pamrs._arrays import Array, Index, Mask
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._design import Design, friction_factor
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
+from pamrs.rig import Muscle
 
 _SIGMA_ROUNDS = 30
 _STEP = 1e-4  # of a scale, for differences

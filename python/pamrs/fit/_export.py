@@ -11,6 +11,7 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.errors import missing_package
+from pamrs.rigs import bench
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -91,8 +92,6 @@ def _scatter(fit: MuscleFit) -> str:
 
 def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
     """What :meth:`MuscleFit.to_rig` returns."""
-    from pamrs.rigs import bench
-
     muscle = fit.muscle
     parameters = dict(muscle.parameters)
     if rig is None:

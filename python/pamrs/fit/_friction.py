@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,11 @@ from pamrs._views import COLOURS, Panels, View
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.findings import to_plain
 from pamrs.fit._data import ForceMap
+from pamrs.fit._export import to_lmfit
 from pamrs.fit._validation import WEAK
 from pamrs.fit._ways import held_lengths
 from pamrs.fit.levels import LawParameter, LevelLine, fit_levels
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
+from pamrs.rig import Muscle
 
 _FEWEST: Final = 4  # rows of a branch
 _BINS: Final = 200  # of a branch's contraction: rows nearer than that are averaged
@@ -240,8 +238,6 @@ class FrictionFit(View):
         MissingPackageError
             If lmfit is not installed.
         """
-        from pamrs.fit._export import to_lmfit
-
         return to_lmfit(self.params, self.covar)
 
     def fit_report(self) -> str:

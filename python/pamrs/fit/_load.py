@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from pamrs._files import is_inside, toml_document
 from pamrs.declared import Rule, holds, is_finite, is_text, problems_of
@@ -15,9 +15,6 @@ from pamrs.fit._data import ForceMap
 from pamrs.fit._files import Columns, read_map
 from pamrs.rig import Muscle, Reader, muscle_problems
 from pamrs.rig.muscle_models import models_with
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
 
 
 @dataclass(frozen=True, eq=False)

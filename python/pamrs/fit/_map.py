@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,9 @@ from pamrs.errors import RecordingError
 from pamrs.findings import to_plain
 from pamrs.fit._checks import check_rest_length
 from pamrs.fit._data import ForceMap
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle, Rig
-
+from pamrs.rig import Muscle, Rig, force_table
+from pamrs.rig.schema import keys_of
+from pamrs.rigs import bench
 
 _MOST_LEVELS: Final = 24
 """Pressure levels that are nodes themselves; of more, as in a ramp, this many are taken."""
@@ -169,9 +168,6 @@ class MapFit(View):
         -------
         Rig
         """
-        from pamrs.rig.schema import keys_of
-        from pamrs.rigs import bench
-
         own = self.to_muscle(muscle)
         if rig is None:
             rig = bench(own)
@@ -290,8 +286,6 @@ def _levels(data: ForceMap) -> Array:
 
 
 def _predict(pressure: Array, contraction: Array, force: Array, gas: Array, e: Array) -> Array:
-    from pamrs.rig import force_table
-
     found = force_table(pressure, contraction, force)
     flat = (np.ascontiguousarray(values.ravel()) for values in (gas, e))
     return found(*flat).reshape(gas.shape)

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,13 @@ from pamrs._checks import contraction_of, matched, one_of, quantities
 from pamrs._views import Panels, View
 from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError
+from pamrs.fit._data import ForceMap
 from pamrs.fit._design import friction_factor
+from pamrs.fit._export import fit_report, to_dict, to_lmfit, to_rig
 from pamrs.fit._statistics import FitStatistics, determination
 from pamrs.fit._validation import CrossValidation, PressureErrors, leave_one_out, summary
+from pamrs.rig import Rig
 from pamrs.units import with_unit
-
-if TYPE_CHECKING:
-    from pamrs.fit._data import ForceMap
-    from pamrs.rig import Rig
 
 Flags = NDArray[np.uint8]
 
@@ -269,8 +268,6 @@ class MuscleFit(View, FitStatistics):
         FitError
             When the moduli are free at each level.
         """
-        from pamrs.fit._export import to_rig
-
         return to_rig(self, rig)
 
     def to_lmfit(self) -> Any:
@@ -282,14 +279,10 @@ class MuscleFit(View, FitStatistics):
         MissingPackageError
             If lmfit is not installed.
         """
-        from pamrs.fit._export import to_lmfit
-
         return to_lmfit(self.params, self.covar)
 
     def to_dict(self) -> dict[str, Any]:
         """The fit as plain numbers and text, ready for JSON."""
-        from pamrs.fit._export import to_dict
-
         return to_dict(self)
 
     def figure(self, path: str | os.PathLike[str]) -> Path:
@@ -300,8 +293,6 @@ class MuscleFit(View, FitStatistics):
 
     def fit_report(self) -> str:
         """The fit in words and numbers, for a terminal."""
-        from pamrs.fit._export import fit_report
-
         return fit_report(self)
 
     def __repr__(self) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -16,17 +16,14 @@ from pamrs._checks import one_of, refused
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._cautions import cautions
 from pamrs.fit._checks import check_rest_length
+from pamrs.fit._data import ForceMap
 from pamrs.fit._design import template
 from pamrs.fit._estimate import Estimate, Free, Known, Problem, estimate
 from pamrs.fit._result import MuscleFit
 from pamrs.fit._statistics import FitParameter
 from pamrs.fit._validation import WEAK, level_forces
+from pamrs.rig import Muscle
 from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, POLYNOMIAL_MODELS
-
-if TYPE_CHECKING:
-    from pamrs.fit._data import ForceMap
-    from pamrs.rig import Muscle
-
 
 #: Geometry that can be fitted, and its unit.
 GEOMETRY: Final[dict[str, str]] = {

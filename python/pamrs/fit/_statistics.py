@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pamrs._arrays import Array, Mask
+from pamrs.fit._data import ForceMap
 from pamrs.fit._estimate import Estimate, Free, Problem
-
-if TYPE_CHECKING:
-    from pamrs.fit._data import ForceMap
-    from pamrs.rig import Muscle
+from pamrs.rig import Muscle
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -25,12 +25,8 @@ from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Grid, lay_grid
 from pamrs.recordings._doubts import suspicions
 from pamrs.recordings._faults import Fault, find_faults
-from pamrs.rig import full_name, named_entries
+from pamrs.rig import Rig, full_name, named_entries
 from pamrs.units import in_words
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
-
 
 _FEW: Final = 20
 

@@ -10,7 +10,7 @@ from pamrs.simulation._batch import Batch, BatchRun, Failure
 from pamrs.simulation._driving import (
     has_frame,
     initial_names,
-    input_names,
+    inputs_of,
     regulators_of,
 )
 from pamrs.simulation._replay import differences, reading, replay
@@ -40,7 +40,7 @@ __all__ = [
     "differences",
     "has_frame",
     "initial_names",
-    "input_names",
+    "inputs_of",
     "reading",
     "regulators_of",
     "replay",

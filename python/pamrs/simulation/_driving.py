@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +14,8 @@ from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, by_hand, doubt_pascals, misshapen, one_of, refused
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.errors import ParameterError, meant
+from pamrs.rig import Rig
 from pamrs.simulation._plants import rowwise
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
 
 #: One array for a block without a name or the only one of its kind, else one for each name.
 Signals = ArrayLike | Mapping[str, ArrayLike]
@@ -214,23 +212,6 @@ def inputs_of(rig: Rig) -> Inputs:
         object.__setattr__(rig, "_inputs", cached)
     inputs: Inputs = cached
     return inputs
-
-
-def input_names(rig: Rig) -> list[str]:
-    """Every signal that a rig takes.
-
-    Parameters
-    ----------
-    rig : Rig
-        The model.
-
-    Returns
-    -------
-    list of str
-        ``valve_command.elbow``, ``supply_command``, ``length``, ``pressure.flexor``: those that it
-        needs first.
-    """
-    return inputs_of(rig).names
 
 
 def initial_names(rig: Rig) -> list[str]:

@@ -20,7 +20,7 @@ from pamrs.diagnosis.evidence import (
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.explain._block_entries import block_entries, not_judged, unexplained
 from pamrs.diagnosis.explain._conditions import Picture, describe
-from pamrs.diagnosis.explain._forms import forms_of
+from pamrs.diagnosis.explain._forms import form_sentence, forms_of
 from pamrs.diagnosis.fit import (
     CHOSEN,
     Problem,
@@ -58,7 +58,6 @@ from pamrs.findings import (
     WrongParameter,
 )
 from pamrs.recordings import Case
-from pamrs.report.forms import form_sentence
 from pamrs.report.verdict import unknown_volumes
 from pamrs.report.verdict import verdict as verdict_in_words
 from pamrs.rig import Rig

@@ -45,8 +45,10 @@ from pamrs.diagnosis.fit._fitting import (
     with_priors,
 )
 from pamrs.diagnosis.fit._held import (
+    ends_in_tolerances,
     holdable,
     known_parameters,
+    moved_value,
     with_known,
     without_passing,
 )
@@ -63,7 +65,6 @@ from pamrs.diagnosis.fit._starts import (
     with_entry,
     without_term,
 )
-from pamrs.diagnosis.fit._tolerances import ends_in_tolerances, moved_value
 from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
 
 __all__ = [

@@ -18,15 +18,16 @@ from pamrs import _core
 from pamrs._arrays import Array
 from pamrs._losses import Losses
 from pamrs.diagnosis.fit._acting import acts_in, core_names, depends
-from pamrs.diagnosis.fit._held import known_parameters, with_known
-from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
-from pamrs.diagnosis.fit._starts import without_term
-from pamrs.diagnosis.fit._tolerances import (
+from pamrs.diagnosis.fit._held import (
     ends_in_tolerances,
     in_tolerances,
+    known_parameters,
     moved_slope,
     moved_value,
+    with_known,
 )
+from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.fit._starts import without_term
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS, Hypothesis, Term, effect_of, find_parameter, usual_values

@@ -45,9 +45,8 @@ from pamrs.diagnosis.fit import (
     with_known,
     without_term,
 )
-from pamrs.diagnosis.model._budget import budget
+from pamrs.diagnosis.model._budget import budget, owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.model._free_run import KnownValues, free_run
-from pamrs.diagnosis.model._owners import owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
