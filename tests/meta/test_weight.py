@@ -20,10 +20,10 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1107,
-    "cli": 1378,
+    "cli": 1376,
     "control": 4622,
     "design": 532,
-    "diagnosis": 10857,
+    "diagnosis": 10855,
     "effects": 408,
     "experiments": 1060,
     "findings": 906,
@@ -40,7 +40,7 @@ PACKAGES = {
 #: The same of what is not the package.
 ASIDE = {"tests": 29322, "trial": 5358, "reproduction": 5043}
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35775
+MOST = 35771
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -3,7 +3,7 @@ from several starts.
 
 Public: `Problem`, `Fit`, `Scaling`, `Weights`,
 `Unfollowed`, `fit`, `residuals`, `changes`, `stacked`,
-`with_priors`, `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`;
+`with_priors`, `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`, `Residuals`, `Stages`;
 `levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where the fit of an effect begins);
 `form_in`, `entry_of`, `with_effects_of`, `with_entry`, `without_term` (effects of a rig
 and their forms);
@@ -31,7 +31,9 @@ from pamrs.diagnosis.fit._fitting import (
     Fit,
     Key,
     Problem,
+    Residuals,
     Scaling,
+    Stages,
     Unfollowed,
     Weights,
     bin_width,
@@ -76,6 +78,8 @@ __all__ = [
     "Events",
     "Fit",
     "Key",
+    "Residuals",
+    "Stages",
     "Problem",
     "Scaling",
     "Start",

@@ -18,6 +18,8 @@ from pamrs.diagnosis.fit import (
     Events,
     Key,
     Problem,
+    Residuals,
+    Stages,
     acts_in,
     concerns,
     form_in,
@@ -37,9 +39,6 @@ from pamrs.rig import Parameter, Rig
 # weightings of pieces for a share's interval: ten of them lie beyond each 95 % end
 _BUDGET_DRAWS = 400
 
-
-Stages = dict[str, dict[Key, Residual]]
-Residuals = dict[Key, Residual]
 
 _NAMED = ("wrong_parameter", "effect")
 """Kinds of terms that a name stands for."""

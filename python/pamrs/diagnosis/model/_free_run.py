@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from pamrs._arrays import Array
 from pamrs.channels import channel_of, dotted, recorded_as, unit_of
-from pamrs.diagnosis.fit import Events, Key, Problem, with_known
+from pamrs.diagnosis.fit import Events, Key, Problem, Stages, with_known
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.effects import EFFECTS, ports_of
 from pamrs.errors import PamrsError, RecordingError
@@ -66,8 +66,6 @@ _FREED = ("muscle_force", "joint_torque", "temperature")
 
 _COMMANDS = ("valve_command", "supply_command", "pressure_command")
 """Channels that drive a free run."""
-
-Stages = dict[str, dict[Key, Residual]]
 
 
 def free_run(
