@@ -24,7 +24,7 @@ from reproduction.statement_tables import Told
 from reproduction.statements import Lines
 from reproduction.tracking import KINDS, PAYLOADS, SETTLED, Track
 from reproduction.tracking_runs import FULL, MIDDLE, STARTS, TRIALS, WRONG, Plan
-from reproduction.waves import TABLE_5_1, compound
+from reproduction.waves import TABLE_5_1, waves
 
 #: Mean squared error at the top of the axis of Fig. 5.8(c), as an rms [deg].
 _AXIS: Final = math.sqrt(400.0)
@@ -106,11 +106,11 @@ def _rig(plan: Plan, search: bool) -> list[Comparison]:
     rows, arm = say.lines(), tracking.arm_model(PAYLOADS)
     inertia = np.asarray(arm.inertia)
     rows.say("inertia_50_lb", inertia[-1] / inertia[0])
-    wanted = np.degrees(compound(plan.record).sampled(tracking.PERIOD)[1].angle)
+    wanted = np.degrees(waves(plan.record).sampled(tracking.PERIOD)[1].angle)
     printed = _phase_zero(plan)
     rows.say("smallest_angle_5", printed.min(), wanted.min())
     rows.say("largest_angle_5", printed.max(), wanted.max())
-    fastest = max(w for _, w in TABLE_5_1)
+    fastest = max(w for _, w in _table())
     rows.say("largest_frequency", fastest / (2.0 * math.pi))
     torque: Any = arm.torque
     rows.say("simplified_torque_5", 100.0 * torque.relative, torque.rms, torque.largest)
@@ -134,9 +134,13 @@ def _rig(plan: Plan, search: bool) -> list[Comparison]:
 def _phase_zero(plan: Plan) -> Array:
     """(5.24) with a triangle of phase 0, which begins at its mean and rises [deg]."""
     time = np.arange(0.0, plan.record + 0.5 * tracking.PERIOD, tracking.PERIOD)
-    cosines = sum(a * np.cos(w * time) for a, w in TABLE_5_1)
+    cosines = sum(a * np.cos(w * time) for a, w in _table())
     triangle = 20.0 / math.pi * np.arcsin(np.sin(2.0 * math.pi * 0.16 * time))
     return np.asarray(60.0 + cosines + triangle)
+
+
+def _table() -> tuple[tuple[float, float], ...]:
+    return TABLE_5_1
 
 
 # ------------------------------------------------------------------------------- 5.4.1

@@ -24,7 +24,7 @@ from reproduction.lift import (
     plant,
     trajectory,
 )
-from reproduction.waves import compound
+from reproduction.waves import waves
 
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis
@@ -104,7 +104,7 @@ def diagnosed(name: str, *, payload: float = PAYLOADS[1], duration: float = 25.0
     paths = (
         ("fit", trajectory()),
         ("fit", cosine_cycles(*degrees(LOW, HIGH), rise=3.0, hold=2.0)),
-        ("held_out", compound()),
+        ("held_out", waves()),
     )
     records = [
         recorded(truth, model, path, role, seed, duration)

@@ -38,7 +38,7 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from reproduction.gaylord import GaylordTorque
 from reproduction.rigs import with_struts
-from reproduction.waves import compound
+from reproduction.waves import waves
 
 Array = NDArray[np.float64]
 
@@ -330,7 +330,7 @@ def tuned(kind: str, payloads: Sequence[float] = PAYLOADS, duration: float = 30.
         name: np.array([gains[name] for _ in payloads for gains in tried]) for name in grid
     }
     done = follow(
-        kind, [plant(payload) for payload in every], arm_model(every), compound(duration), **columns
+        kind, [plant(payload) for payload in every], arm_model(every), waves(duration), **columns
     )
     shape = (len(payloads), len(tried))
     j = combined(done.nu(SETTLED).reshape(shape), done.omega(SETTLED).reshape(shape), axis=1)

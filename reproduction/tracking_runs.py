@@ -24,7 +24,7 @@ from reproduction.tracking import (
     lift,
     plant,
 )
-from reproduction.waves import compound
+from reproduction.waves import waves
 
 if TYPE_CHECKING:
     from pamrs.diagnosis.result import Diagnosis
@@ -101,7 +101,7 @@ class Plan:
             [payload for payload, _ in every], np.array([factor for _, factor in every])
         )
         plants = [plant(payload) for payload, _ in every]
-        return follow("sliding", plants, arm, compound(self.record))
+        return follow("sliding", plants, arm, waves(self.record))
 
     @cache  # noqa: B019
     def switching(self, values: tuple[float, ...], payload: float = MIDDLE) -> Track:
@@ -115,7 +115,7 @@ class Plan:
             "sliding",
             [plant(payload)] * len(every),
             arm,
-            compound(min(self.record, 50.0)),
+            waves(min(self.record, 50.0)),
             switching=gains,
         )
 
@@ -131,7 +131,7 @@ class Plan:
             "adaptive sliding",
             [plant(MIDDLE)] * n,
             arm,
-            compound(self.record),
+            waves(self.record),
             gains=gains,
             bounds=None,
             note_every=self.record / 200.0,
@@ -146,7 +146,7 @@ class Plan:
             "neural",
             [plant(p) for p in payloads],
             arm_model(payloads),
-            compound(self.record),
+            waves(self.record),
             note_every=every,
         )
 
@@ -173,7 +173,7 @@ class Plan:
             "neural",
             [plant(p) for p in payloads],
             arm_model(payloads),
-            compound(self.record),
+            waves(self.record),
             learnt=learnt,
             note_every=self.record / 5.0,
         )
@@ -187,14 +187,14 @@ class Plan:
             kind,
             [_rig(case) for case in self.cases],
             arm_model([p for p, _ in self.cases]),
-            compound(self.training),
+            waves(self.training),
         )
 
     @cache  # noqa: B019
     def compared(self, kind: str, trajectory: str) -> Track:
         """A controller after training on ``"compound"`` or ``"lift"``, a row for each case."""
         before = self.trained(kind)
-        path = compound(self.record) if trajectory == "compound" else lift()
+        path = waves(self.record) if trajectory == "compound" else lift()
         plants, arm = [_rig(case) for case in self.cases], arm_model([p for p, _ in self.cases])
         return follow(kind, plants, arm, path, learnt=None if before is None else before.learnt)
 
@@ -207,7 +207,7 @@ class Plan:
             return HysteresisCompensation(cascade, self.model()) if known else cascade
 
         return follow(
-            "sliding", [rig], arm_model([MIDDLE]), compound(min(self.record, 60.0)), wrap=wrap
+            "sliding", [rig], arm_model([MIDDLE]), waves(min(self.record, 60.0)), wrap=wrap
         )
 
     def model(self) -> Rig:
@@ -236,7 +236,7 @@ _NOISE: Final = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angl
 def _recording(role: str, seed: int, begin: float, seconds: float = 16.0) -> Recording:
     """Seconds of the compound trajectory under the cascaded PID, with the sensors' noise."""
     rig = plant(MIDDLE, "muscle_hysteresis", HYSTERESIS)
-    pid, path = controller("cascaded PID", arm_model([MIDDLE])), compound()
+    pid, path = controller("cascaded PID", arm_model([MIDDLE])), waves()
     simulator = Simulator(rig, sample_time=PERIOD)
 
     def answer(sample: dict[str, float]) -> float:

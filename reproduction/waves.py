@@ -57,7 +57,7 @@ class Waves:
         )
 
 
-def compound(
+def waves(
     duration: float = 100.0, cosines: tuple[tuple[float, float], ...] = TABLE_5_1
 ) -> Trajectory:
     """The compound trajectory (5.24), ``sum A_i cos(w_i t) + triangle + bias``.
@@ -77,6 +77,6 @@ def compound(
     -------
     Trajectory
     """
-    waves = tuple((math.radians(size), w) for size, w in cosines)
+    given = tuple((math.radians(size), w) for size, w in cosines)
     mean = math.radians(50.0) + math.radians(10.0)
-    return Trajectory("compound", duration, Waves(waves, mean, math.radians(20.0), 0.16))
+    return Trajectory("compound", duration, Waves(given, mean, math.radians(20.0), 0.16))

@@ -38,7 +38,7 @@ PACKAGES = {
     "sweeps": 817,
 }
 #: The same of what is not the package.
-ASIDE = {"tests": 29322, "trial": 5358, "reproduction": 5043}
+ASIDE = {"tests": 29322, "trial": 5358, "reproduction": 5045}
 #: All of pamrs: the sum of the budgets is not above it.
 MOST = 35771
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
