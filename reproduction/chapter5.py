@@ -24,6 +24,7 @@ from reproduction.statement_tables import Told
 from reproduction.statements import Lines
 from reproduction.tracking import KINDS, PAYLOADS, SETTLED, Track
 from reproduction.tracking_runs import FULL, MIDDLE, STARTS, TRIALS, WRONG, Plan
+from reproduction.waves import TABLE_5_1, waves
 
 #: Mean squared error at the top of the axis of Fig. 5.8(c), as an rms [deg].
 _AXIS: Final = math.sqrt(400.0)
@@ -105,7 +106,7 @@ def _rig(plan: Plan, search: bool) -> list[Comparison]:
     rows, arm = say.lines(), tracking.arm_model(PAYLOADS)
     inertia = np.asarray(arm.inertia)
     rows.say("inertia_50_lb", inertia[-1] / inertia[0])
-    wanted = np.degrees(tracking.waves(plan.record).sampled(tracking.PERIOD)[1].angle)
+    wanted = np.degrees(waves(plan.record).sampled(tracking.PERIOD)[1].angle)
     printed = _phase_zero(plan)
     rows.say("smallest_angle_5", printed.min(), wanted.min())
     rows.say("largest_angle_5", printed.max(), wanted.max())
@@ -138,9 +139,7 @@ def _phase_zero(plan: Plan) -> Array:
     return np.asarray(60.0 + cosines + triangle)
 
 
-def _table() -> Any:
-    from pamrs.control.trajectories import TABLE_5_1
-
+def _table() -> tuple[tuple[float, float], ...]:
     return TABLE_5_1
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pamrs.control import AirModel, ArmModel, Feedforward, Fuzzy, Parallel, closed_loop
-from pamrs.control.trajectories import Trajectory, compound, cosine_cycles, degrees
+from pamrs.control.trajectories import Trajectory, cosine_cycles, degrees
 from pamrs.recordings import Case, Recording
 from pamrs.rig import Rig
 from reproduction.lift import (
@@ -24,6 +24,7 @@ from reproduction.lift import (
     plant,
     trajectory,
 )
+from reproduction.waves import waves
 
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis
@@ -103,7 +104,7 @@ def diagnosed(name: str, *, payload: float = PAYLOADS[1], duration: float = 25.0
     paths = (
         ("fit", trajectory()),
         ("fit", cosine_cycles(*degrees(LOW, HIGH), rise=3.0, hold=2.0)),
-        ("held_out", compound()),
+        ("held_out", waves()),
     )
     records = [
         recorded(truth, model, path, role, seed, duration)

@@ -33,10 +33,12 @@ from pamrs.control import (
     sweep,
 )
 from pamrs.control.metrics import combined, total_curvature
-from pamrs.control.trajectories import Trajectory, compound, lift_hold_return
+from pamrs.control.trajectories import Trajectory, lift_hold_return
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
+from reproduction.gaylord import GaylordTorque
 from reproduction.rigs import with_struts
+from reproduction.waves import waves
 
 Array = NDArray[np.float64]
 
@@ -76,11 +78,6 @@ GRIDS: Final[Mapping[str, Mapping[str, tuple[float, ...]]]] = {
 }
 
 
-def waves(duration: float = 100.0) -> Trajectory:
-    """The compound trajectory (5.24) with Table 5.1."""
-    return compound(duration=duration)
-
-
 def lift() -> Trajectory:
     """Lift, hold and return between 15 and 60 deg, 5 s each, 25 s in all (4.4.1, 5.5)."""
     return lift_hold_return(math.radians(15.0), math.radians(60.0))
@@ -102,17 +99,13 @@ def _simplified() -> ArmModel:
     return ArmModel.from_rig(with_struts("shoulder"), torque="simplified")
 
 
-def arm_model(
-    payloads: Sequence[float], factor: Value = 1.0, torque: str = "simplified"
-) -> ArmModel:
+def arm_model(payloads: Sequence[float], factor: Value = 1.0, *, guessed: bool = False) -> ArmModel:
     """What the controllers know, (5.1)-(5.4): the right I, b and m g r for the payload [lb] of each
-    plant, times a factor.
+    plant, times a factor; ``guessed``: with the torque of (5.25).
     """
-    base = (
-        _simplified()
-        if torque == "simplified"
-        else ArmModel.from_rig(with_struts("shoulder"), torque=torque)
-    )
+    base, rig = _simplified(), with_struts("shoulder")
+    if guessed:
+        base = ArmModel.from_rig(rig, torque=GaylordTorque(rig))
     exact = [ArmModel.from_rig(plant(payload), torque=base.torque) for payload in payloads]
     known = base.replace(
         inertia=np.array([arm.inertia for arm in exact]),

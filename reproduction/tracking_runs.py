@@ -23,8 +23,8 @@ from reproduction.tracking import (
     follow,
     lift,
     plant,
-    waves,
 )
+from reproduction.waves import waves
 
 if TYPE_CHECKING:
     from pamrs.diagnosis.result import Diagnosis
@@ -100,7 +100,8 @@ class Plan:
         arm = arm_model(
             [payload for payload, _ in every], np.array([factor for _, factor in every])
         )
-        return follow("sliding", [plant(payload) for payload, _ in every], arm, waves(self.record))
+        plants = [plant(payload) for payload, _ in every]
+        return follow("sliding", plants, arm, waves(self.record))
 
     @cache  # noqa: B019
     def switching(self, values: tuple[float, ...], payload: float = MIDDLE) -> Track:
@@ -160,7 +161,7 @@ class Plan:
             if start == "15 lb":
                 weights = {name: values[1] for name, values in taught.items()}
             else:
-                arm = arm_model([payload], torque="gaylord" if start == "Gaylord" else "simplified")
+                arm = arm_model([payload], guessed=start == "Gaylord")
                 outer = controller("neural", arm, start="model").outer
                 assert isinstance(outer, Neural)
                 weights = outer.weights

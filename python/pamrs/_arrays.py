@@ -1,5 +1,5 @@
-"""Of arrays: stretches in which something holds, and solutions of normal equations, whatever scales
-their unknowns have.
+"""Of arrays: their types by what they hold, stretches in which something holds, and solutions of
+normal equations, whatever scales their unknowns have.
 """
 
 from __future__ import annotations
@@ -7,9 +7,13 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Array", "ArrayLike", "Index", "Mask", "solve_normal", "stretches"]
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.intp]
 
 _RIDGE: Final = 1e-12
 """What is added to the diagonal, as a part of it: more than the rounding of the sums, far less than
@@ -42,7 +46,7 @@ def solve_normal(normal: Array, right: Array) -> Array:
     return np.asarray(np.linalg.solve(scaled, right / size[rows]) / size[rows])
 
 
-def stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def stretches(flags: Mask) -> list[tuple[int, int]]:
     """Where a flag stays set.
 
     Parameters

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Final, ParamSpec, TypeVar
 
 from pamrs.channels import UNITS, channel_of
-from pamrs.errors import ParameterError
+from pamrs.errors import ParameterError, UnitWarning
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -514,8 +514,6 @@ def doubt(said: str, *, inside: int = 1) -> None:
     """
     import sys
     import warnings
-
-    from pamrs.errors import UnitWarning
 
     if sys._getframe(1 + inside).f_globals.get("__name__", "").partition(".")[0] == "pamrs":
         return

@@ -12,7 +12,6 @@ from pamrs.control import (
     ArmModel,
     ByLength,
     Cascade,
-    DeadZoneCompensation,
     Feedforward,
     FeedforwardPressure,
     FullTorque,
@@ -34,7 +33,6 @@ from tests.tables import rows_of
 SHOULDER = pamrs.rigs.shoulder()
 FULL = ArmModel.from_rig(SHOULDER)
 SIMPLIFIED = ArmModel.from_rig(SHOULDER, torque="simplified")
-GAYLORD = ArmModel.from_rig(SHOULDER, torque="gaylord")
 AIR = AirModel(SHOULDER)
 #: Another torque than that of FULL, so that a feedforward has two branches.
 LENGTHENING = FullTorque(SHOULDER.with_parameters({"muscle.modulus_scale": 0.8}), lengthening=True)
@@ -96,9 +94,6 @@ CONTROLLERS = {
     "pid back-calculation": lambda x: PID(1.0 * x, 0.3, 0.05, period=PERIOD, **BACK),
     "pid measured rate": lambda x: PID(2.0, 1.5, 0.2 * x, period=PERIOD, measured_rate=True),
     "fuzzy": lambda x: Fuzzy(1.0 * x, 0.5, 0.5, period=PERIOD, output_filter=0.02),
-    "fuzzy quoted": lambda x: Fuzzy(
-        1.0, 0.5 * x, 0.5 * x, table="quoted", period=PERIOD, output_filter=0.02
-    ),
     "feedforward": lambda x: forward(1.0 * x),
     "feedforward friction": lambda x: forward(
         5.0, FULL.scaled(x), friction=True, pressure_filter=0.01
@@ -122,12 +117,8 @@ CONTROLLERS = {
     "adaptive free": lambda x: follow(
         AdaptiveSliding, SIMPLIFIED, (x, x, x), bounds=None, hold_at_limit=False
     ),
-    "adaptive published": lambda x: follow(AdaptiveSliding.published, SIMPLIFIED, 1, slope=4.0 * x),
     "neural zero": lambda x: follow(Neural, SIMPLIFIED, slope=3.0 * x),
     "neural model": lambda x: follow(Neural, FULL, start="model", gains=(300.0, 2e4, 3e5 * x)),
-    "neural gaylord": lambda x: follow(
-        Neural, GAYLORD, start="model", bounds=None, switching=4e5 * x
-    ),
     "hysteresis sliding": lambda x: HysteresisCompensation(
         follow(Sliding, FULL, slope=5.0 * x), DIAGNOSED
     ),
@@ -147,7 +138,6 @@ CONTROLLERS = {
     "rig whole recruited": lambda x: whole(WHOLE, "sliding", switching=2e4 * x, shares=recruited()),
     "rig mass by length": lambda x: by_length(5.0 * x),
     "rig mass adaptive": lambda x: whole(MASS, "adaptive", slope=5.0 * x),
-    "dead zone": lambda x: DeadZoneCompensation(PID(2.0 * x, 1.5, 0.1, period=PERIOD), DIAGNOSED),
 }
 
 

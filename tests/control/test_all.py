@@ -101,7 +101,7 @@ def test_a_controller_goes_on_from_a_pickle_and_from_its_state_bit_for_bit(name,
         controller.restore({**state, "other": 1.0})
 
 
-VALVE_ONLY = ("pid", "pid back-calculation", "pid measured rate", "fuzzy", "fuzzy quoted")
+VALVE_ONLY = ("pid", "pid back-calculation", "pid measured rate", "fuzzy")
 NOT_READ = {
     ("pressure loop", "joint_angle"),
     *((name, "muscle_pressure") for name in (*VALVE_ONLY, "dead zone")),

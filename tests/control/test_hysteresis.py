@@ -11,15 +11,13 @@ import pamrs
 from pamrs.control import (
     PID,
     Cascade,
-    DeadZoneCompensation,
     HysteresisCompensation,
     HystereticTorque,
     Neural,
-    Reference,
     Sliding,
     SlipMemory,
 )
-from tests.control.cases import DIAGNOSED, FULL, PERIOD, SHOULDER, smooth
+from tests.control.cases import FULL, PERIOD, SHOULDER, smooth
 from tests.simulation.refusals import refused
 
 FRICTION = {"friction_constant": 15.0, "friction_pressure": 8e-5, "presliding": 1e-3}
@@ -101,20 +99,6 @@ def test_an_effect_of_no_strength_changes_nothing():
         assert one == other
 
 
-def test_the_dead_zone_is_jumped():
-    controller = PID(1.0, output_filter=0.0, period=PERIOD)
-    over = DeadZoneCompensation(PID(1.0, output_filter=0.0, period=PERIOD), DIAGNOSED)
-    for k, error in enumerate((0.0, 0.5, -0.5, 2.0, -7.0, 0.01)):
-        sample, aim = {"joint_angle": 0.0}, Reference(error)
-        x = (controller.update(k * PERIOD, sample, aim) - 5.0) / 5.0
-        y = (over.update(k * PERIOD, sample, aim) - 5.0) / 5.0
-        effective = math.copysign(max(abs(y) - 0.04, 0.0) / 0.96, y)
-        if abs(x) >= over.blend or x == 0.0:
-            assert effective == pytest.approx(x, abs=1e-12)
-        else:
-            assert 0.0 < abs(y) < 0.04 + abs(x)
-
-
 def test_what_cannot_be_compensated_is_named():
     sliding = Sliding(FULL, period=PERIOD)
     refused(
@@ -122,7 +106,5 @@ def test_what_cannot_be_compensated_is_named():
         ("PID", lambda: HysteresisCompensation(PID(1.0), HYSTERETIC)),
         ("Cascade", lambda: HysteresisCompensation(Cascade(Neural(FULL)), HYSTERETIC)),
         ("source", lambda: HysteresisCompensation(sliding, HYSTERETIC, source="other")),
-        ("valve_dead_zone", lambda: DeadZoneCompensation(PID(1.0), SHOULDER)),
-        ("blend", lambda: DeadZoneCompensation(PID(1.0), DIAGNOSED, blend=0.0)),
         ("presliding", lambda: SlipMemory(0.0)),
     )

@@ -16,7 +16,6 @@ import pamrs
 from pamrs.control import (
     PID,
     Cascade,
-    DeadZoneCompensation,
     HysteresisCompensation,
     Parallel,
     RigController,
@@ -349,7 +348,6 @@ def test_a_pressure_is_no_valve_command(rig):
     refused(
         ("Cascade", lambda: live(rig, sliding)),
         ("Cascade", lambda: sweep(rig, sliding, LIFT, 0.1, n=2)),
-        ("Cascade", lambda: DeadZoneCompensation(sliding, DIAGNOSED)),
         ("Cascade", lambda: Parallel(CONTROLLERS["feedforward"](1.0), sliding)),
     )
     assert closed_loop(rig, Cascade(sliding), LIFT, 0.1).command.max() <= 10.0

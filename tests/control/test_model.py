@@ -15,7 +15,6 @@ from pamrs.control import (
     ConductanceInverse,
     Feedforward,
     FullTorque,
-    GaylordTorque,
     OrificeInverse,
     Reference,
     RigModel,
@@ -246,21 +245,6 @@ def test_simplified_torque_is_the_least_squares_fit_with_its_residual():
     assert fit.at(0.0) == fit.at(math.radians(15.0))
 
 
-def test_gaylord_estimate():
-    guess = GaylordTorque(SHOULDER)
-    muscle = SHOULDER.muscle
-    angle = math.radians(60.0)
-    length = 0.276 - 0.7 * 0.0254 * math.radians(45.0)
-    area = (3 * length**2 - muscle.fibre_length**2) / (4 * math.pi * muscle.turns**2)
-    by_hand = 6 * area * 0.7 * 0.0254
-    assert guess.at(angle)[0] == pytest.approx(by_hand, rel=1e-6)
-    assert guess.at(angle)[1] == 0.0
-    # as printed, 5 in long and with B = 11.23 in, the muscle would push
-    assert 3 * 5.0**2 < 11.23**2
-    # it overestimates the slope where the muscle is contracted
-    assert guess.at(math.radians(110.0))[0] > FullTorque(SHOULDER).at(math.radians(110.0))[0]
-
-
 def test_wrong_models_and_rigs_that_they_cannot_be_of_are_named():
     for name in ("bench", "two_joint_arm", "tube"):
         refused((name, lambda name=name: ArmModel.from_rig(pamrs.rigs.named(name))))
@@ -272,5 +256,4 @@ def test_wrong_models_and_rigs_that_they_cannot_be_of_are_named():
         ("torque = 'other'", lambda: ArmModel.from_rig(SHOULDER, torque="other")),
         ("eight", lambda: SimplifiedTorque([1.0], (0.0, 1.0))),
         ("above zero", lambda: SimplifiedTorque([0, 0, 0, -1.0, 0, 0, 0, 0], (0.0, 1.0))),
-        ("effective_radius", lambda: GaylordTorque(SHOULDER, -1.0)),
     )

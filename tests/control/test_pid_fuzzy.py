@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pamrs.control import (
-    FUZZY_SETS,
     PID,
     AdaptiveSliding,
     Feedforward,
@@ -26,8 +25,8 @@ from tests.control.cases import AIR, FULL
 from tests.simulation.refusals import refused
 
 
-def surface(x, y, table="anti_diagonal"):
-    rules = fuzzy_rules(table)
+def surface(x, y):
+    rules = fuzzy_rules()
     return fuzzy_surface(x, y, rules.tolist(), rules)
 
 
@@ -96,22 +95,11 @@ def test_rule_table():
     assert rules[6].tolist() == [0, 1, 2, 3, 3, 3, 3]
 
 
-def test_the_rule_that_the_text_quotes():
-    """Error "negative small" and rate "positive small" is quoted as "positive small": not so in the
-    standard table.
-    """
-    error, rate = FUZZY_SETS.index("NS"), FUZZY_SETS.index("PS")
-    assert FUZZY_SETS[round(3 * fuzzy_rules("quoted")[error, rate]) + 3] == "PS"
-    assert FUZZY_SETS[round(3 * fuzzy_rules("anti_diagonal")[error, rate]) + 3] == "ZE"
-    changed = fuzzy_rules("quoted") != fuzzy_rules("anti_diagonal")
-    assert changed.sum() == 6
-    for table in ("quoted", "anti_diagonal"):
-        rules = fuzzy_rules(table)
-        assert np.array_equal(rules, -rules[::-1, ::-1])
-        assert np.diff(rules, axis=0).min() >= 0.0
-        assert np.diff(rules, axis=1).min() >= 0.0
-    told = "table = 'other'.*'quoted' is needed, or 7 x 7 numbers"
-    refused(("7 x 7", lambda: fuzzy_rules(np.zeros((6, 7)))), (told, lambda: fuzzy_rules("other")))
+def test_a_table_of_indices_gives_the_centres_of_the_sets():
+    rules = fuzzy_rules()
+    assert rules[2, 4] == 0.0  # error NS and rate PS give ZE
+    assert np.array_equal(fuzzy_rules(3.0 * rules), rules)
+    refused(("7 x 7", lambda: fuzzy_rules(np.zeros((6, 7)))))
 
 
 @pytest.mark.parametrize(
@@ -127,11 +115,10 @@ def test_options_of_the_sensor_are_those_of_the_controller(kind, arguments):
 
 def test_surface_at_the_centres_is_the_table_and_by_hand_between():
     centres = [(k - 3) / 3 for k in range(7)]
-    for table in ("anti_diagonal", "quoted"):
-        rules = fuzzy_rules(table)
-        for i, x in enumerate(centres):
-            for j, y in enumerate(centres):
-                assert surface(x, y, table) == pytest.approx(rules[i, j], abs=1e-12)
+    rules = fuzzy_rules()
+    for i, x in enumerate(centres):
+        for j, y in enumerate(centres):
+            assert surface(x, y) == pytest.approx(rules[i, j], abs=1e-12)
     # x = 1/12: ZE 3/4, PS 1/4; y = 1/6: ZE 1/2, PS 1/2; premises 1/2, 1/2, 1/4, 1/4 for ZE, PS, PS,
     # PM
     area = {m: m - m * m / 2 for m in (0.5, 0.25)}
@@ -149,14 +136,13 @@ def test_surface_is_odd_bounded_and_saturates_at_the_shoulders(x, y):
     assert value == surface(max(-1.0, min(1.0, x)), max(-1.0, min(1.0, y)))
 
 
-@pytest.mark.parametrize(("table", "allowed"), [("anti_diagonal", 0.0075), ("quoted", 0.0205)])
-def test_surface_rises_but_for_what_the_minimum_does(table, allowed):
+def test_surface_rises_but_for_what_the_minimum_does():
     x = np.linspace(-1.1, 1.1, 401)
     grid = np.meshgrid(x, x, indexing="ij")
-    f = surface(grid[0].ravel(), grid[1].ravel(), table).reshape(401, 401)
+    f = surface(grid[0].ravel(), grid[1].ravel()).reshape(401, 401)
     for axis in (0, 1):
         fall = (np.maximum.accumulate(f, axis=axis) - f).max()
-        assert fall < allowed
+        assert fall < 0.0075
     assert f.min() == -1.0
     assert f.max() == 1.0
 
@@ -194,11 +180,10 @@ def test_lengths_of_a_batch_must_agree():
 
 
 def test_gains_can_be_read_and_not_changed():
-    """Those that are published too."""
     valve = {"null": 5.0, "limits": (0.0, 10.0), "unit": "rad"}
     for made, names in (
-        (PID.published("experiment_23kg", kd=0.1), {"kp": 1.4, "ki": 2.5, "kd": 0.1, **valve}),
-        (Fuzzy.published("optimal_23kg"), {"g1": 0.45, "g2": 0.6, "h": 0.65, **valve}),
+        (PID(1.4, 2.5, 0.1), {"kp": 1.4, "ki": 2.5, "kd": 0.1, **valve}),
+        (Fuzzy(0.45, 0.6, 0.65), {"g1": 0.45, "g2": 0.6, "h": 0.65, **valve}),
         (PressureLoop(1.0, 2.0), {"kp": 1.0, "ki": 2.0, "null": 5.0}),
         (Feedforward(FULL, AIR, 0.7), {"km": 0.7, "null": 5.0}),
         (Sliding(FULL), {"slope": 5.0, "switching": 2e4, "boundary_layer": 0.2}),
@@ -211,7 +196,6 @@ def test_gains_can_be_read_and_not_changed():
                 setattr(made, name, 50.0)
     with pytest.raises(ValueError, match="read-only"):
         PID(np.ones(3)).kp[0] = 2.0
-    refused(*(("one of", lambda kind=kind: kind.published("other")) for kind in (PID, Fuzzy)))
 
 
 def test_a_feedforward_of_no_gain_closes_the_valve():

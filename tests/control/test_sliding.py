@@ -9,7 +9,7 @@ import pytest
 
 from pamrs.control import AdaptiveSliding, Cascade, Neural, Reference, Sliding, fuzzy_rules
 from pamrs.errors import ParameterError
-from tests.control.cases import FULL, GAYLORD, PERIOD, SIMPLIFIED, samples, singles
+from tests.control.cases import FULL, PERIOD, SIMPLIFIED, samples, singles
 from tests.simulation.refusals import refused
 
 LAMBDA, KD = 5.0, 2e4
@@ -199,7 +199,7 @@ def test_the_start_from_the_model_is_the_sliding_law():
     (5.17)-(5.19).
     """
     still = {"start": "model", "nodes": 10, "gains": (0.0, 0.0, 0.0)}
-    for arm in (SIMPLIFIED, FULL, GAYLORD):
+    for arm in (SIMPLIFIED, FULL):
         neural = sharp(Neural, arm, boundary_layer=0.2, **still)
         sliding = sharp(Sliding, arm, boundary_layer=0.2)
         for k, angle in enumerate(neural.angles[2:8].tolist()):
@@ -260,7 +260,6 @@ def test_wrong_arguments_are_named():
         ("gains", lambda: AdaptiveSliding(SIMPLIFIED, (1.0, 1.0))),
         ("bounds", lambda: AdaptiveSliding(SIMPLIFIED, bounds=[(0.0, 1.0)] * 3)),
         ("bounds = 'some'.* or three pairs", lambda: AdaptiveSliding(SIMPLIFIED, bounds="some")),
-        ("trial", lambda: AdaptiveSliding.published(SIMPLIFIED, 4)),
         ("start", lambda: Neural(SIMPLIFIED, start="other")),
         ("nodes", lambda: Neural(SIMPLIFIED, nodes=1)),
         ("bounds", lambda: Neural(SIMPLIFIED, bounds=(1.0, 1.0, -1.0))),

@@ -17,7 +17,6 @@ def every():
     return {
         "lift": tr.lift_hold_return(15 * DEG, 60 * DEG),
         "step": tr.step(0.3, 0.8, at=1.0),
-        "compound": tr.compound(),
         "cycles": tr.cosine_cycles(15 * DEG, 90 * DEG),
         "table": tr.from_samples(table_time, np.sin(table_time)),
     }
@@ -26,7 +25,6 @@ def every():
 CORNERS = {
     "lift": (0.0, 5.0, 10.0, 15.0),
     "step": (1.0,),
-    "compound": tuple(np.arange(0.0, 101.0, 0.5 / 0.16)),
     "cycles": tuple(k * 11.0 + s for k in range(16) for s in (0.0, 6.0)),
     "table": (0.0, 4.0),
 }
@@ -71,24 +69,6 @@ def test_lift_hold_return_is_the_printed_one():
     assert not reference.acceleration.any()
 
 
-def test_compound_has_the_amplitudes_and_the_triangle_of_5_24():
-    trajectory = tr.compound()
-    # the triangle begins at its lowest value, zero
-    assert trajectory(0.0).angle / DEG == pytest.approx(20 + 13 + 7 + 5 + 50)
-    # without the sinusoids, a triangle between 50 and 70 deg of 0.16 Hz
-    bare = tr.compound(cosines=[])
-    time, reference = bare.sampled(0.001, 1.0 / 0.16)
-    assert reference.angle.min() / DEG == pytest.approx(50.0)
-    assert reference.angle.max() / DEG == pytest.approx(70.0)
-    assert reference.angle.mean() / DEG == pytest.approx(60.0, abs=1e-2)
-    assert bare(1.0).angle == pytest.approx(bare(1.0 + 3 / 0.16).angle)
-    # spectrum: each amplitude of Table 5.1 by least squares over a long record
-    time = np.arange(0.0, 2000.0, 0.01)
-    rest = (trajectory(time).angle - bare(time).angle) / DEG
-    columns = np.stack([np.cos(w * time) for _, w in tr.TABLE_5_1])
-    assert np.linalg.lstsq(columns.T, rest, rcond=None)[0] == pytest.approx([20, 13, 7, 5])
-
-
 def test_cosine_cycles_rise_hold_and_return_eight_times():
     trajectory = tr.cosine_cycles(15 * DEG, 50 * DEG)
     assert trajectory.duration == 8 * 22.0
@@ -120,7 +100,6 @@ def test_bad_input_is_named():
         ("duration", lambda: tr.lift_hold_return(0.2, 1.0, duration=14.0)),
         ("at = 9", lambda: tr.step(0.0, 1.0, at=9.0)),
         ("cycles", lambda: tr.cosine_cycles(0.2, 1.0, cycles=0)),
-        ("bias", lambda: tr.compound(bias=math.inf)),
         ("3 samples; 5", lambda: tr.from_samples([0, 1, 2], [0, 1, 2])),
         (r"time\[2\]", lambda: tr.from_samples([0, 1, 1, 2, 3], [0, 1, 2, 3, 4])),
         ("smoothing", lambda: tr.from_samples(range(5), range(5), smoothing=-1.0)),

@@ -50,7 +50,7 @@ def test_the_loops_of_a_map_run_side_by_side(rig, monkeypatch):
             ways.append(self.side_by_side)
             return super().control(*args, **options)
 
-    monkeypatch.setattr("pamrs.simulation.Batch", Watched)
+    monkeypatch.setattr("pamrs.control._sweeping.Batch", Watched)
     axes = {"kp": [0.5, 1.0], "ki": [0.0, 1.0]}
     gain_map(rig, pid, axes, LIFT, payloads=[2.0, 9.0], **FAST)
     assert [way.tolist() for way in ways] == [[True] * 8]

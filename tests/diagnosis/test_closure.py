@@ -10,6 +10,7 @@ import pytest
 import pamrs
 from pamrs import _core
 from pamrs.diagnosis.explain import forms_of
+from pamrs.diagnosis.explain._forms import form_sentence
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, fits, residuals
 from pamrs.diagnosis.fit._fitting import FIT_BIN_TIME
 from pamrs.diagnosis.noise import NoiseLevel, excess, inflation, noise_levels
@@ -19,7 +20,6 @@ from pamrs.diagnosis.search._closure import _MOST_TERMS
 from pamrs.effects import CATALOGUE, CLOSURE_TERMS, EFFECTS, MEMORY_OF, Term
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording
-from pamrs.report.forms import form_sentence
 from pamrs.simulation import core_rig
 from tests.diagnosis.asked import SETTINGS, problem_of
 from tests.diagnosis.noisy import SHOULDER, driven

@@ -13,10 +13,10 @@ import pytest
 from numpy.typing import NDArray
 
 import pamrs
-from pamrs.control import trajectories
 from pamrs.diagnosis.prepare import implausible, suspected_units
 from reproduction import lift
 from reproduction.lift_diagnosis import recorded
+from reproduction.waves import waves
 from tests.diagnosis.asked import SETTINGS
 from tests.diagnosis.noisy import SHOULDER, driven
 
@@ -232,7 +232,7 @@ def test_an_arm_whose_swing_moves_the_pressure_is_not_refused() -> None:
     name, payload = "smooth muscle", lift.PAYLOADS[1]
     truth = lift.plant(lift.VARIANTS[name], payload, seed=None)
     model = lift.assumed(lift.VARIANTS[name]).with_parameters({"arm.payload": payload})
-    record = recorded(truth, model, trajectories.compound(), "fit", 0, 25.0)
+    record = recorded(truth, model, waves(), "fit", 0, 25.0)
     assert np.ptp(record.channels["joint_angle"]) > 1.0
     assert implausible(record, model, SETTINGS) == []
     turned = record.channels | {VALVE: 10.0 - record.channels[VALVE]}

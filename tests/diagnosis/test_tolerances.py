@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import pamrs
 from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Problem, fit, free_baseline, residuals
-from pamrs.diagnosis.fit._tolerances import in_tolerances, moved_slope, moved_value
+from pamrs.diagnosis.fit._held import in_tolerances, moved_slope, moved_value
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import Prepared, begun_alike, predicted, residual
 from pamrs.rig import Parameter

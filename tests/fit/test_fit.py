@@ -312,35 +312,6 @@ def test_prediction_says_where_it_extrapolates():
     np.testing.assert_allclose(fit.predict(3e5, length=0.18), fit.predict(3e5, 0.1))
 
 
-def test_predicted_spread_is_that_of_repeated_fits():
-    real = muscle()
-    at_p, at_e = np.array([2e5, 4e5, 8e5]), np.array([0.0, 0.15, 0.25])
-    fits = [
-        fit_muscle(measure(real, noise=5.0, seed=seed), real, errors="plain", noise=5.0)
-        for seed in range(150)
-    ]
-    spread = np.std([fit.predict(at_p, at_e) for fit in fits], axis=0)
-    np.testing.assert_allclose(fits[0].predict_std(at_p, at_e), spread, rtol=0.2)
-    both = fits[0].predict_std(at_p, at_e, new_point=True)
-    np.testing.assert_allclose(both, np.hypot(fits[0].predict_std(at_p, at_e), 5.0))
-
-
-def test_predicted_spread_includes_the_geometry():
-    real = muscle(order=1)
-    data, free = measure(real, noise=2.0), {"free": ["braid_angle"], "tolerance": TOLERANCE}
-    fit = fit_muscle(data, real, **free)
-    best = fit.muscle
-    steps = {"modulus_slope": 1e-3, "modulus_offset": 10.0, "braid_angle": 1e-5}
-
-    def force(name, step):
-        moved = np.add(best.parameters[name], step)
-        return float(best.replace(**{name: moved.tolist()}).force(4e5, 0.1))
-
-    slopes = [(force(name, d) - force(name, -d)) / (2.0 * d) for name, d in steps.items()]
-    spread = math.sqrt(np.array(slopes) @ fit.covar @ slopes)
-    assert fit.predict_std(4e5, 0.1) == pytest.approx(spread, rel=1e-5)
-
-
 def test_prediction_refuses_what_is_not_possible():
     fit = fit_muscle(measure(muscle()), muscle())
     with pytest.raises(ParameterError, match="contraction or length"):

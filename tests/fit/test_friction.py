@@ -81,8 +81,6 @@ def test_exact_loops_give_the_coefficients_back():
     assert fit.slope_significant
     assert np.allclose(fit.predict(LEVELS), C0 + C1 * LEVELS, rtol=1e-3)
     assert np.allclose(fit.residual, 0.0, atol=1e-4)
-    pressure, contraction, force = fit.mean_curve()
-    assert np.allclose(force, muscle().force(pressure, contraction), rtol=1e-3, atol=0.5)
 
 
 def test_a_pressure_at_which_nothing_pulls_gives_no_coefficient():
@@ -245,8 +243,6 @@ def test_pressure_cycles_at_held_lengths_are_loops(contractions):
     assert fit.params["friction_pressure_slope"].value == pytest.approx(C1, rel=0.04)
     assert fit.presliding is None
     assert fit.presliding_reason == "not determinable: the length is held"
-    pressure, contraction, force = fit.mean_curve()
-    assert np.allclose(force, muscle().force(pressure, contraction), rtol=0.02, atol=8.0)
     assert fit.to_dict()["isometric"] is True
 
 

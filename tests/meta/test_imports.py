@@ -25,7 +25,6 @@ LAYERS = (
         "_losses",
         "_progress",
         "_tables",
-        "_termination",
         "_views",
         "_writing",
     ),

@@ -19,35 +19,35 @@ ROOT = Path(__file__).parents[2]
 
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
-    ".": 1140,
-    "cli": 1380,
-    "control": 4744,
-    "design": 548,
-    "diagnosis": 10850,
-    "effects": 409,
-    "experiments": 1068,
-    "findings": 915,
-    "fit": 3065,
+    ".": 1107,
+    "cli": 1376,
+    "control": 4622,
+    "design": 532,
+    "diagnosis": 10866,
+    "effects": 408,
+    "experiments": 1060,
+    "findings": 906,
+    "fit": 2965,
     "library": 71,
-    "recordings": 4903,
-    "report": 2123,
-    "rig": 2258,
+    "recordings": 4882,
+    "report": 2042,
+    "rig": 2238,
     "rigs": 139,
-    "simulation": 1110,
-    "studio": 681,
-    "sweeps": 830,
+    "simulation": 1095,
+    "studio": 663,
+    "sweeps": 817,
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 26652,
+    "tests": 26580,
     "benchmarks/tests": 226,
-    "reproduction": 4960,
-    "reproduction/tests": 1306,
+    "reproduction": 5045,
+    "reproduction/tests": 1356,
     "trial": 5358,
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 36234
+MOST = 35789
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

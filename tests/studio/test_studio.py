@@ -27,7 +27,7 @@ from pamrs.cli import main
 from pamrs.errors import ParameterError
 from pamrs.recordings import propose
 from pamrs.studio import Studio, serve
-from pamrs.studio._curves import sparkline
+from pamrs.studio._app import sparkline
 from tests.studio.browser import CHROMIUM, Browser
 
 EXAMPLE = Path(__file__).parents[2] / "python/pamrs/cli/example_files/shoulder"

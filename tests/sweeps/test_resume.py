@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import pamrs
-from pamrs.sweeps._progress import Progress
+from pamrs.sweeps._running import Progress
 from pamrs.sweeps._store import Entry, read_journal
 from tests.sweeps.helpers import same, small
 

@@ -27,9 +27,7 @@ from pamrs.errors import NotWrittenError, ParameterError, RigError, meant
 from pamrs.units import DIMENSIONS, to_si
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from pamrs._arrays import Array
     from pamrs.recordings import Recording
     from pamrs.rig import Muscle, Rig
 
@@ -200,7 +198,7 @@ def rig_named(file: Path) -> Rig:
 
 def usable_samples(
     recording: Recording,
-) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+) -> dict[str, tuple[Array, Array]]:
     """Times [s] and values [SI] of the samples of each channel that may be used, to be drawn."""
     return {
         name: (recording.time[rows], recording.channels[name][rows])

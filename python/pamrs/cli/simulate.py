@@ -17,9 +17,7 @@ from pamrs.errors import ParameterError, RecordingError, meant
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from pamrs._arrays import Array
     from pamrs.recordings import Recording
     from pamrs.rig import Rig
     from pamrs.simulation import Simulation
@@ -161,7 +159,7 @@ def _steps(
     """Simulate under signals of steps."""
     import numpy as np
 
-    from pamrs.simulation import initial_names, input_names, simulate
+    from pamrs.simulation import initial_names, inputs_of, simulate
 
     if not (0.0 < sample_time <= duration and duration / sample_time < 1e8):
         given = f"--duration = {duration:g} s with --sample-time = {sample_time:g} s"
@@ -169,7 +167,7 @@ def _steps(
             f"{given} is not allowed: two times > 0 s are needed that give from 2 to 1e8 rows"
         )
     time = np.asarray(np.arange(round(duration / sample_time) + 1) * sample_time, dtype=np.float64)
-    known = input_names(rig)
+    known = inputs_of(rig).names
     drive: dict[str, Any] = {}
     for text in hold:
         name, values = _held(text, time, known)
@@ -195,9 +193,7 @@ def _steps(
         return simulate(rig, sample_time=sample_time, initial=start, **drive)
 
 
-def _held(
-    text: str, time: NDArray[np.float64], known: list[str]
-) -> tuple[str, NDArray[np.float64]]:
+def _held(text: str, time: Array, known: list[str]) -> tuple[str, Array]:
     """A signal of steps from ``"valve_command.elbow = 5 V, 8 V @ 1 s"``; ``known`` are those that
     the rig takes.
     """

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from pamrs import library
 from pamrs._checks import positive, refused
 from pamrs._writing import check_writable
 from pamrs.cli._shared import (
@@ -80,7 +81,6 @@ def size_command(
     3.2.3).
     """
     check_writable(file_of(json))
-    from pamrs import library
     from pamrs.design.sizing import size
 
     requirement = _requirement(point)
@@ -171,7 +171,6 @@ def _filling(valve: str | None, supply: str | None, dead_volume: str | None) -> 
 
 def _candidate(name: str, pressure: float | None) -> Candidate:
     """A muscle of the library, or of a rig file."""
-    from pamrs import library
     from pamrs.design.sizing import Candidate
 
     if name in library.names():
@@ -189,8 +188,6 @@ def _candidate(name: str, pressure: float | None) -> Candidate:
 
 def _remarks(candidates: Sequence[Candidate]) -> list[str]:
     """Candidates of the library that would work beyond the pressures of their tests."""
-    from pamrs import library
-
     tested = {name: library.entry(name).max_pressure for name in library.names()}
     return [
         (

@@ -2,8 +2,6 @@
 tuning and stability.
 """
 
-from __future__ import annotations
-
 from pamrs.control import (
     iosystem,
     linear,
@@ -15,12 +13,11 @@ from pamrs.control import (
     tuning,
 )
 from pamrs.control._adaptive import AdaptiveSliding
-from pamrs.control._air import AirModel, ConductanceInverse, OrificeInverse
+from pamrs.control._air import AirModel, ConductanceInverse, FlowInverse, OrificeInverse, SetPoint
 from pamrs.control._cascade import Cascade, PressureLoop, cascaded_pid
 from pamrs.control._feedforward import Feedforward, FeedforwardPressure, Parallel
-from pamrs.control._fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
+from pamrs.control._fuzzy import Fuzzy, fuzzy_rules, fuzzy_surface
 from pamrs.control._hysteresis import (
-    DeadZoneCompensation,
     HysteresisCompensation,
     HystereticTorque,
     SlipMemory,
@@ -44,14 +41,12 @@ from pamrs.control._sweeping import Sweep, sweep
 from pamrs.control._torque import (
     BundleTorque,
     FullTorque,
-    GaylordTorque,
     GroupTorque,
     OpposedTorque,
     SimplifiedTorque,
     TorqueModel,
     torque_line,
 )
-from pamrs.control._ways import FlowInverse, SetPoint
 from pamrs.control.live import Device, LiveError, LiveRun, SystemClock, run_live
 from pamrs.control.metrics import Metrics
 from pamrs.control.trajectories import Trajectory
@@ -60,7 +55,6 @@ from pamrs.control.tuning import GainMap
 __all__ = [
     "ANTI_WINDUP",
     "Actuation",
-    "FUZZY_SETS",
     "NETWORKS",
     "PID",
     "AdaptiveSliding",
@@ -87,14 +81,12 @@ __all__ = [
     "ClosedLoop",
     "ConductanceInverse",
     "Controller",
-    "DeadZoneCompensation",
     "Device",
     "Feedforward",
     "FilteredDerivative",
     "FullTorque",
     "Fuzzy",
     "GainMap",
-    "GaylordTorque",
     "HysteresisCompensation",
     "HystereticTorque",
     "Integrator",

@@ -34,13 +34,6 @@ from pamrs.errors import ParameterError
 
 _NAMES: Final = ("inertia", "viscous", "weight")
 
-#: Table 5.2, by trial: gains of I, b, m g r.
-_PUBLISHED: Final[Mapping[int, tuple[float, float, float]]] = {
-    1: (10.0, 10.0, 0.01),
-    2: (100.0, 100.0, 0.001),
-    3: (100.0, 100.0, 0.0001),
-}
-
 
 def dead(s: Value, deadband: Value) -> Value:
     """``s`` where it is beyond a deadband on either side, else 0 (5.15)."""
@@ -109,35 +102,6 @@ class AdaptiveSliding(SlidingController):
         super().__init__(arm, gains=(*self._gains, self._deadband), **others)
         self._rates = tuple(self._gains[p.kind] * self.period for p in self._parameters)
         self.reset()
-
-    @classmethod
-    def published(cls, arm: JointModel, trial: int, **others: Any) -> AdaptiveSliding:
-        """With the gains of Table 5.2, deadband 0.02 and without projection, as printed.
-
-        The unit of the printed gains is not stated. Taken as SI with radians the estimates of I and
-        b move as far as Fig. 5.10 shows (to about 1000 and 200 in 100 s), that of m g r hardly: its
-        unit there is another, since a payload of 50 lb weighs 200 N m.
-
-        Parameters
-        ----------
-        arm : JointModel
-            As for the class.
-        trial : {1, 2, 3}
-            Row of the table.
-        **others
-            The other arguments.
-
-        Returns
-        -------
-        AdaptiveSliding
-
-        Raises
-        ------
-        ParameterError
-            If there is no such trial.
-        """
-        one_of("trial", trial, _PUBLISHED)
-        return cls(arm, _PUBLISHED[trial], **{"bounds": None, **others})
 
     @property
     def estimates(self) -> dict[str, Value]:

@@ -9,14 +9,12 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import one_of
 from pamrs.channels import channel_of
 from pamrs.control._protocol import Controller, Reference, commands_of
 from pamrs.errors import ParameterError
-
-Array = NDArray[np.float64]
 
 #: Half width of the differences in what is measured [SI].
 _WIDTHS: Final[dict[str, float]] = {

@@ -4,7 +4,7 @@ feedback.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,9 +17,7 @@ from pamrs.control._sampled import Fixed, Restorer, SampledController
 from pamrs.control._torque import TorqueModel
 from pamrs.control._values import as_value, clip, where
 from pamrs.errors import ParameterError
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
+from pamrs.rig import Rig
 
 
 def _torque(arm: JointModel, aim: Reference, friction: bool) -> Value:

@@ -4,45 +4,34 @@ Control, 1998).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import ClassVar, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import one_of
-from pamrs.control._output_feedback import OutputFeedback
+from pamrs._arrays import Array, ArrayLike
 from pamrs.control._parts import LowPass
+from pamrs.control._pid import OutputFeedback
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed
 from pamrs.control._values import as_value, clip, positive_gain
 from pamrs.errors import ParameterError
 
-FUZZY_SETS: Final = ("NB", "NM", "NS", "ZE", "PS", "PM", "PB")
-"""Names of the sets, centres -1, -2/3, ... 1."""
-_HALF: Final = 3  # sets on each side of zero
-
-#: Gains as printed: 4.4.1.2 (optimum at 23 kg), 4.4.2 and Fig. 4.13 (beside a feedforward), Fig.
-#: 4.14 (series of kM).
-_PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
-    "optimal_23kg": {"g1": 0.45, "g2": 0.6, "h": 0.65},
-    "feedforward": {"g1": 0.4, "g2": 0.3, "h": 0.7},
-    "feedforward_gain_series": {"g1": 0.45, "g2": 0.3, "h": 0.7},
-}
+_HALF: Final = 3  # sets on each side of zero, NB, NM, NS, ZE, PS, PM, PB
 
 
-def fuzzy_rules(table: str | ArrayLike = "anti_diagonal") -> NDArray[np.float64]:
+def fuzzy_rules(table: ArrayLike | None = None) -> Array:
     """Centre of the output set for each pair of sets.
 
-    Table 4.1 is printed as a picture. ``anti_diagonal`` is the standard table, output index
+    Table 4.1 is printed as a picture; the standard table is used, output index
     ``clip(i + j, -3, 3)``: error NS and rate PS give ZE. The text quotes "positive small" for that
-    pair; ``quoted`` is the standard table with the smallest change that gives it: where error and
-    rate cancel, the output leans to the rate by one set, ``i + j + sgn(j) [i + j = 0]``.
+    pair.
 
     Parameters
     ----------
-    table : {"anti_diagonal", "quoted"} or array_like, shape (7, 7)
-        Or output indices from -3 to 3, rows by error from NB to PB, columns by rate.
+    table : array_like, shape (7, 7), optional
+        Output indices from -3 to 3, rows by error from NB to PB, columns by rate; the standard
+        table by default.
 
     Returns
     -------
@@ -52,13 +41,11 @@ def fuzzy_rules(table: str | ArrayLike = "anti_diagonal") -> NDArray[np.float64]
     Raises
     ------
     ParameterError
-        If there is no such table, or it is not one.
+        If the table is none.
     """
-    i, j = np.meshgrid(np.arange(-_HALF, _HALF + 1), np.arange(-_HALF, _HALF + 1), indexing="ij")
-    if isinstance(table, str):
-        one_of("table", table, ("anti_diagonal", "quoted"), also=", or 7 x 7 numbers")
-        index = (i + j + (np.sign(j) * (i + j == 0) if table == "quoted" else 0)).astype(np.float64)
-        return np.clip(index, -_HALF, _HALF) / _HALF
+    if table is None:
+        i, j = np.indices((7, 7)) - _HALF
+        return np.clip((i + j).astype(np.float64), -_HALF, _HALF) / _HALF
     given = np.asarray(table, dtype=np.float64)
     if given.shape != (7, 7) or not np.all(np.isfinite(given)) or np.any(np.abs(given) > _HALF):
         raise ParameterError(
@@ -69,15 +56,15 @@ def fuzzy_rules(table: str | ArrayLike = "anti_diagonal") -> NDArray[np.float64]
 
 
 def fuzzy_surface(
-    error: Value, rate: Value, rules: Sequence[Sequence[float]], rules_array: NDArray[np.float64]
+    error: Value, rate: Value, rules: Sequence[Sequence[float]], rules_array: Array
 ) -> Value:
     """Output of the rules for scaled inputs, before h.
 
     Triangular sets that overlap by half, so that two of each input are active and their memberships
     sum to one; premise by the minimum (4.10); centre of gravity of the output sets, each a triangle
     cut off at its premise ``m`` with the area ``w (m - m^2/2)``. With the minimum as premise the
-    surface is not quite monotone: it falls by at most 0.007 (``anti_diagonal``) or 0.02
-    (``quoted``) of its range where it should rise.
+    surface is not quite monotone: it falls by at most 0.007 of its range where it should
+    rise (standard table).
 
     Parameters
     ----------
@@ -121,9 +108,7 @@ def fuzzy_surface(
     return _surface(places[0], places[1], rules_array)
 
 
-def _surface(
-    x: NDArray[np.float64], y: NDArray[np.float64], rules_array: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _surface(x: Array, y: Array, rules_array: Array) -> Array:
     """The same for arrays of places among the sets, 0 to 6."""
     i, j = np.minimum(x.astype(np.intp), 5), np.minimum(y.astype(np.intp), 5)
     a, b = x - i, y - j
@@ -162,7 +147,7 @@ class Fuzzy(OutputFeedback):
         Time between two updates [s].
     unit : {"rad", "deg"}
         Unit of the angle in the gains.
-    table : {"anti_diagonal", "quoted"} or array_like, shape (7, 7)
+    table : array_like, shape (7, 7), optional
         As for :func:`fuzzy_rules`.
     limits : tuple of (float, float)
         Smallest and largest output [V].
@@ -181,13 +166,12 @@ class Fuzzy(OutputFeedback):
     Examples
     --------
     >>> from pamrs.control import Fuzzy, Reference
-    >>> controller = Fuzzy.published("optimal_23kg", output_filter=0.0)
+    >>> controller = Fuzzy(0.45, 0.6, 0.65, output_filter=0.0)
     >>> round(controller.update(0.0, {"joint_angle": 0.3}, Reference(0.9)), 3)
     5.65
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("sensor", "low_pass")
-    _PUBLISHED = _PRINTED
 
     g1, g2, h, output_filter = Fixed(), Fixed(), Fixed(), Fixed("low_pass.time_constant")
 
@@ -199,7 +183,7 @@ class Fuzzy(OutputFeedback):
         *,
         period: float = 1e-3,
         unit: str = "rad",
-        table: str | ArrayLike = "anti_diagonal",
+        table: ArrayLike | None = None,
         limits: tuple[float, float] = (0.0, 10.0),
         null: float = 5.0,
         output_filter: Value = 0.05,

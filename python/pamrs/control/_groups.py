@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pamrs.channels import dotted
 from pamrs.errors import ParameterError
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
+from pamrs.rig import Rig
 
 
 def check_single(rig: Rig, blocks: tuple[str, ...], needed: str) -> None:

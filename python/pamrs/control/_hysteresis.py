@@ -18,20 +18,17 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from pamrs._checks import one_of, positive, refused
-from pamrs.control._protocol import Controller, Measurement, Reference, Value, check_drives_valve
+from pamrs._checks import one_of, positive
+from pamrs.control._protocol import Controller, Measurement, Reference, Value
 from pamrs.control._sampled import Restorer, SampledController, Stateful
-from pamrs.control._spline import Spline
 from pamrs.control._torque import TorqueModel, _parts
-from pamrs.control._values import clip
+from pamrs.control._values import Spline, clip
 from pamrs.errors import ParameterError
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
+from pamrs.rig import Rig
 
 _SHARE: Final = (0.125, 0.25, 0.5, 1.0)  # of the presliding distance, by element, as in the core
 _LEAST: Final = 0.05  # of C1 without friction that stays in any case
@@ -203,60 +200,6 @@ class HysteresisCompensation(SampledController):
             raise self._refusal(str(error)) from None
         self._batch = self._size
         return answer
-
-
-class DeadZoneCompensation(SampledController):
-    """A controller of the valve whose command jumps over the spool's dead zone, the effect
-    ``valve_dead_zone``.
-
-    ``x_e = sgn(x) max(|x| - d, 0)/(1 - d)`` backwards: ``x = sgn(x_e) (d + (1 - d)|x_e|)``, linear
-    within ``blend`` of the null so that the valve does not chatter across it.
-
-    Parameters
-    ----------
-    controller : Controller
-        It answers valve volts.
-    rig : Rig
-        The diagnosed rig, with the effect.
-    blend : float
-        Opening below which the jump is taken in proportion [1].
-
-    Raises
-    ------
-    ParameterError
-        If the controller answers a pressure, the rig has not the effect on its one valve, or
-        ``blend`` is not within 0 (left out) and 1.
-    """
-
-    _PARTS: ClassVar[tuple[str, ...]] = ("controller",)
-
-    def __init__(self, controller: Controller, rig: Rig, *, blend: float = 0.005) -> None:
-        check_drives_valve(controller)
-        found = [entry for entry in rig.effects if entry["id"] == "valve_dead_zone"]
-        valves = rig.tables("valve")
-        if len(found) != 1 or len(valves) != 1:
-            raise ParameterError(
-                f"rig {rig.name!r} has {len(found)} valve_dead_zone on {len(valves)} valves: one "
-                "on one is needed"
-            )
-        if not 0.0 < blend < 1.0:
-            raise refused("blend", blend, "above 0 and below 1")
-        self.controller, self.blend = controller, float(blend)
-        self.half_width = float(found[0]["parameters"]["half_width"])
-        valve = next(iter(valves.values()))
-        self.null, self.half_range = float(valve["null_voltage"]), float(valve["half_range"])
-        super().__init__(controller.period, parts=(controller,))
-        self.reset()
-
-    def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
-        opening = (
-            self.controller.update(time, measurement, reference) - self.null
-        ) / self.half_range
-        jump = clip(opening / self.blend, -1.0, 1.0)
-        return self.null + self.half_range * (
-            self.half_width * jump + (1.0 - self.half_width) * opening
-        )
 
 
 def _owner(controller: Any) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from pamrs._checks import positive
 from pamrs.control._groups import highest_pressure, joints_of, lengths_of
@@ -18,9 +18,7 @@ from pamrs.control._protocol import Controller, Measurement, Reference, Value
 from pamrs.control._sampled import SampledController
 from pamrs.control._torque import TorqueModel, joint_torque, rest_length_of
 from pamrs.errors import ParameterError
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
+from pamrs.rig import Rig
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

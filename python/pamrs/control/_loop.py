@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import check_names, finite, one_of, quantities
 from pamrs._tables import Columns, Tabular
 from pamrs._tables import over_time as columns_over_time
@@ -24,7 +24,6 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import Event, Simulator, core_rig, default_step, whole_samples
 
-Array = NDArray[np.float64]
 #: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`:
 #: ``lambda u: {"valve_command": {"flexor": u, ...}}``.
 Actuation: TypeAlias = "Callable[[Any], Mapping[str, Any]]"

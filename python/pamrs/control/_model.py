@@ -8,7 +8,7 @@ import abc
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 from pamrs._checks import finite, refused, rising
 from pamrs.control._groups import highest_pressure, joints_of
@@ -16,9 +16,7 @@ from pamrs.control._protocol import Value
 from pamrs.control._torque import TorqueModel, drive_limits, joint_torque
 from pamrs.control._values import as_value, positive_gain, sin
 from pamrs.errors import ParameterError
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
+from pamrs.rig import Rig
 
 
 class Parameter(NamedTuple):
@@ -190,7 +188,7 @@ class ArmModel(JointModel):
         rig : Rig
             With muscles, joint and a one-link arm; one of several links has a
             :class:`pamrs.control.PlanarArmModel`.
-        torque : {"full", "simplified", "gaylord"} or TorqueModel
+        torque : {"full", "simplified"} or TorqueModel
             Which torque model; of several muscles the full one.
         pressure_limit : float, optional
             [Pa]; by default the initial pressure of the supply, or ``max_pressure`` of ``[limits]``

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import one_of, refused, whole
 from pamrs._writing import write_atomically
 from pamrs.control._adaptive import dead, held
@@ -34,8 +34,6 @@ from pamrs.control._sampled import Fixed
 from pamrs.control._sliding import SlidingController
 from pamrs.control._values import as_value, clip, gains_of
 from pamrs.errors import ParameterError
-
-Array = NDArray[np.float64]
 
 NETWORKS: Final = ("H", "C", "G")
 """The networks: of the reference acceleration [Pa s2/rad], of the reference rate [Pa s/rad], and of
@@ -54,8 +52,7 @@ class Neural(SlidingController):
     ----------
     arm : JointModel
         Gives range and pressure limit and, with ``start="model"``, the start: ``H = I/C1``,
-        ``C = b/C1``, ``G = (m g r sin - C2)/C1`` (5.17)-(5.19). With the torque ``"gaylord"`` that
-        is the educated guess of (5.25).
+        ``C = b/C1``, ``G = (m g r sin - C2)/C1`` (5.17)-(5.19).
     start : {"zero", "model"}
         What the networks know at first.
     nodes : int

@@ -1,25 +1,68 @@
 """Proportional-integral-derivative control (dissertation (4.9)): the law, and the controller of the
-joint angle.
+joint angle, with what it shares with fuzzy control.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar, Final
+import abc
+from collections.abc import Iterable
+from typing import Any, ClassVar
 
-from pamrs.control._output_feedback import OutputFeedback
-from pamrs.control._parts import Integrator, LowPass
+from pamrs.control._parts import Integrator, JointSensor, LowPass
 from pamrs.control._protocol import Measurement, Reference, Value
-from pamrs.control._sampled import Fixed, Stateful
-from pamrs.control._values import as_value, clip, limits_around
+from pamrs.control._sampled import Fixed, SampledController, Stateful
+from pamrs.control._values import angle_factor, as_value, clip, limits_around
 
-#: Gains as printed: 4.4.2 (with feedforward, kM 1.0), 4.5.1.2 (best combined at 23 kg), Fig. 4.9
-#: (about, at 11 kg).
-_PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
-    "feedforward": {"kp": 5.0, "ki": 2.0, "kd": 0.0},
-    "experiment_23kg": {"kp": 1.4, "ki": 2.5, "kd": 0.0},
-    "optimal_11kg": {"kp": 1.1, "ki": 4.0, "kd": 0.0},
-}
+
+class OutputFeedback(SampledController):
+    """A controller of the joint angle by the valve, which a feedforward can be added to.
+
+    Parameters
+    ----------
+    period : float
+        Time between two updates [s].
+    gains : iterable of float or ndarray
+        Everything that may be an array, but for the sensor's.
+    unit, limits, null, rate_filter, angle_filter, measured_rate
+        As for :class:`pamrs.control.PID`.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite or not allowed; the message names it.
+    """
+
+    unit, limits, null = Fixed(), Fixed(), Fixed()
+
+    def __init__(
+        self,
+        period: float,
+        gains: Iterable[Any],
+        *,
+        unit: str,
+        limits: tuple[float, float],
+        null: float,
+        rate_filter: Value,
+        angle_filter: Value,
+        measured_rate: bool,
+    ) -> None:
+        self._unit, self._scale = unit, angle_factor(unit)
+        low, high, self._null = limits_around(limits, null)
+        self._limits = low, high
+        self.sensor = JointSensor(
+            period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
+        )
+        super().__init__(period, (*gains, *self.sensor.gains))
+
+    def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
+        """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
+        return self.answer(time, measurement, reference, 0.0)
+
+    @abc.abstractmethod
+    def answer(
+        self, time: float, measurement: Measurement, reference: Reference, bias: Value
+    ) -> Value:
+        """As :meth:`update`, with ``bias`` [V] added before the limits: a feedforward beside it."""
 
 
 class PIDLaw(Stateful):
@@ -159,7 +202,6 @@ class PID(OutputFeedback):
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("law", "sensor")
-    _PUBLISHED = _PRINTED
 
     kp, ki, kd = Fixed("law.kp"), Fixed("law.ki"), Fixed("law.kd")
     output_filter = Fixed("law.output_filter")

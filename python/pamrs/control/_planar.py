@@ -16,11 +16,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import finite, refused
 from pamrs.control._groups import highest_pressure, joints_of
 from pamrs.control._model import JointModel, Parameter
@@ -28,11 +28,7 @@ from pamrs.control._protocol import Value
 from pamrs.control._torque import TorqueModel, drive_limits, joint_torque
 from pamrs.control._values import positive_gain
 from pamrs.errors import ParameterError
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
-
-Array = NDArray[np.float64]
+from pamrs.rig import Rig
 
 
 class JointTorques:

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from pamrs._checks import check_names, one_of, refused
 from pamrs.channels import dotted, unit_of
-from pamrs.control._air import AirModel
+from pamrs.control._air import AirModel, FlowInverse, SetPoint
 from pamrs.control._at_rest import SAMPLE, after, closed, kept, resting, slowest
 from pamrs.control._groups import Group, lengths_of
 from pamrs.control._load import shortened
@@ -36,7 +36,6 @@ from pamrs.control._rig_model import RigModel
 from pamrs.control._sampled import Restorer, SampledController, Stateful
 from pamrs.control._sharing import CoContraction, Demand, Share, Together
 from pamrs.control._values import where as chosen
-from pamrs.control._ways import FlowInverse, SetPoint
 from pamrs.errors import ParameterError
 from pamrs.simulation import Simulator, core_rig
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import one_of
 from pamrs.control._adaptive import AdaptiveSliding
 from pamrs.control._air import AirModel
@@ -22,11 +22,8 @@ from pamrs.control._protocol import Controller
 from pamrs.control._sliding import Sliding
 from pamrs.control._torque import GroupTorque, TorqueModel, active_groups, group_torques
 from pamrs.errors import ParameterError
+from pamrs.rig import Rig
 
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
-
-Array = NDArray[np.float64]
 _CROSSOVER: Final = 110.0  # 1/s, that of the shoulder's pressure loop with its default gains
 _RESET: Final = 1.0  # 1/s, ki/kp of the same
 #: I [kg m2] and I/C1 of the shoulder with its payload, at mid-range.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike, Mask
 from pamrs.control._groups import lengths_of
 from pamrs.control._loop import Actuation, actuation_of, measured_by, tracked_of
 from pamrs.control._protocol import Controller, check_controller
@@ -18,12 +18,7 @@ from pamrs.control.metrics import slope_sine
 from pamrs.control.trajectories import Trajectory, check_reach
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import default_step, whole_samples
-
-if TYPE_CHECKING:
-    from pamrs.simulation import BatchRun
-
-Array = NDArray[np.float64]
+from pamrs.simulation import Batch, BatchRun, default_step, whole_samples
 
 
 @dataclass(frozen=True)
@@ -50,7 +45,7 @@ class Sweep:
     rms: Array
     largest: Array
     final: Array
-    failed: NDArray[np.bool_]
+    failed: Mask
     run: BatchRun = field(repr=False)
     trajectory: Trajectory
     unit: str
@@ -140,8 +135,6 @@ def sweep(
     ParameterError
         If times, lengths or names do not fit together.
     """
-    from pamrs.simulation import Batch
-
     factor = angle_factor(unit)
     check_controller(controller)
     period = controller.period

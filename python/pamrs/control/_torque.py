@@ -9,30 +9,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import check_names, one_of
 from pamrs.channels import dotted
 from pamrs.control._groups import Group, beyond_sine, check_single, groups_of, highest_pressure
 from pamrs.control._protocol import Value
-from pamrs.control._spline import Spline
-from pamrs.control._values import clip, positive_gain, where
+from pamrs.control._values import Spline, clip, positive_gain, where
 from pamrs.errors import ParameterError
-from pamrs.rig import Joint
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle, Rig
-
-Array = NDArray[np.float64]
+from pamrs.rig import Joint, Muscle, Rig
 
 # of a table over the joint's range; makes its error some 1e-9 of the largest value
 _NODES: Final = 1025
 _STRUT: Final = 1e9  # buckling load of a muscle that pushes, whatever it is pushed with [N]
 _LEAST_SLOPE: Final = 0.01  # of the largest C1: below it a pressure says nothing about the torque
-_INCH: Final = 0.0254
 
 
 class TorqueModel(Protocol):
@@ -442,46 +435,6 @@ class SimplifiedTorque:
         return ((k1 * x + k2) * x + k3) * x + k4, ((k5 * x + k6) * x + k7) * x + k8
 
 
-class GaylordTorque:
-    """The educated guess of (5.25): Gaylord's force on a constant arm,
-    ``C1 = n (3 L^2 - B^2)/(4 pi N^2) r_eff``, ``C2 = 0``.
-
-    The length is linear in the angle, ``L = L0 - r_eff (theta - theta_0)``. As printed, L = 5 in
-    with B = 11.23 in, the force would be negative (3 L^2 < B^2): the muscle's own rest length is
-    taken, and its own B and N, which for the shoulder are 11.33 in and 1.02.
-
-    Parameters
-    ----------
-    rig : Rig
-        As for :func:`torque_line`.
-    effective_radius : float
-        ``r_eff`` [m]; 0.7 in as printed.
-
-    Raises
-    ------
-    ParameterError
-        As :func:`torque_line`; if the radius is not above zero.
-    """
-
-    def __init__(self, rig: Rig, effective_radius: float = 0.7 * _INCH) -> None:
-        muscle, joint, table = _parts(rig)
-        radius = float(positive_gain("effective_radius", effective_radius))
-        gaylord = muscle.replace(model="gaylord")
-        low, high = float(table["min_angle"]), float(table["max_angle"])
-        angle = np.linspace(low, high, _NODES)
-        rest = float(muscle.parameters["rest_length"])
-        contraction = np.minimum(
-            radius * (angle - float(joint.parameters["rest_angle"])) / rest,
-            muscle.contraction_limits[1],
-        )
-        c1 = int(muscle.parameters["count"]) * gaylord.gas_area(contraction) * radius
-        self._slope = Spline(low, high, np.maximum(c1, _LEAST_SLOPE * c1.max()))
-
-    def at(self, angle: Value) -> tuple[Value, Value]:
-        """``C1`` [N m/Pa] and ``C2`` = 0 at an angle [rad]."""
-        return self._slope(angle), 0.0
-
-
 def active_groups(rig: Rig, active: Sequence[str] | None) -> tuple[Group, ...]:
     """The groups of muscles of a rig that are used.
 
@@ -549,7 +502,7 @@ def joint_torque(
     rig : Rig
     joint : str
         Its name.
-    torque : {"full", "simplified", "gaylord"} or TorqueModel
+    torque : {"full", "simplified"} or TorqueModel
         Which; of several muscles the full one.
     active : sequence of str, optional
         Chambers whose muscles are used; all by default.
@@ -567,7 +520,6 @@ def joint_torque(
     makers: dict[str, Any] = {
         "full": FullTorque,
         "simplified": SimplifiedTorque.fit,
-        "gaylord": GaylordTorque,
     }
     one_link = active is None and not rig.tables("link")
     alone = one_link and len(rig.tables("muscle")) == len(rig.tables("joint")) == 1

@@ -1,5 +1,5 @@
 """Numbers of one plant or of a batch: the few operations that need a word for both, lean for plain
-floats.
+floats, and a tabulated function.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import (
     as_column,
     as_numbers,
@@ -23,7 +23,6 @@ from pamrs._checks import (
 from pamrs.control._protocol import Value
 from pamrs.errors import ParameterError
 
-Times = NDArray[np.float64]
 #: How many of a unit are in a radian.
 _PER_RADIAN: Final[dict[str, float]] = {"rad": 1.0, "deg": 180.0 / math.pi}
 
@@ -85,7 +84,7 @@ def gains_of(names: Sequence[str], gains: Sequence[Any]) -> tuple[Value, ...]:
     return tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
 
 
-def times_of(values: Any, least: int) -> Times:
+def times_of(values: Any, least: int) -> Array:
     """Rising times [s], ``least`` of them or more; a ParameterError for anything else."""
     (times,) = matched(time=as_column("time", values))
     if times.size < least:
@@ -168,3 +167,61 @@ def where(condition: Any, value: Value, other: Value) -> Value:
     if isinstance(condition, bool) and value.__class__ is float and other.__class__ is float:
         return value if condition else other
     return np.where(condition, value, other)
+
+
+class Spline:
+    """Cubic spline through values at even places, held beyond the ends; the same for floats and
+    arrays, bit for bit.
+
+    Parameters
+    ----------
+    low, high : float
+        First and last place.
+    values : ndarray, shape (k,)
+        Values at k >= 4 even places.
+    """
+
+    def __init__(self, low: float, high: float, values: Array) -> None:
+        from scipy.interpolate import CubicSpline
+
+        self.low, self.high, self.cells = float(low), float(high), values.size - 1
+        self._step = (self.high - self.low) / self.cells
+        self._coefficients = np.ascontiguousarray(
+            CubicSpline(np.arange(values.size) * self._step, values).c.T
+        )
+        self._rows: list[list[float]] = self._coefficients.tolist()
+
+    def __call__(self, place: Value) -> Value:
+        """Value at a place."""
+        if place.__class__ is float:
+            x = (
+                self.low if place < self.low else self.high if place > self.high else place
+            ) - self.low
+            cell = int(x / self._step)
+            if cell >= self.cells:
+                cell = self.cells - 1
+            a, b, c, d = self._rows[cell]
+            x -= cell * self._step
+            return ((a * x + b) * x + c) * x + d
+        places, (ka, kb, kc, kd) = self._find(np.asarray(place))
+        return np.asarray(((ka * places + kb) * places + kc) * places + kd)
+
+    def slope(self, place: Value) -> Value:
+        """Derivative at a place; beyond the ends that of the end."""
+        if place.__class__ is float:
+            x = (
+                self.low if place < self.low else self.high if place > self.high else place
+            ) - self.low
+            cell = int(x / self._step)
+            if cell >= self.cells:
+                cell = self.cells - 1
+            a, b, c, _ = self._rows[cell]
+            x -= cell * self._step
+            return (3.0 * a * x + 2.0 * b) * x + c
+        places, (ka, kb, kc, _) = self._find(np.asarray(place))
+        return np.asarray((3.0 * ka * places + 2.0 * kb) * places + kc)
+
+    def _find(self, place: Array) -> tuple[Array, Array]:
+        x = np.minimum(np.maximum(place, self.low), self.high) - self.low
+        cell = np.minimum((x / self._step).astype(np.intp), self.cells - 1)
+        return x - cell * self._step, self._coefficients[cell].T

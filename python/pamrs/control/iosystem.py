@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import check_names
 from pamrs.control.linear import python_control
 from pamrs.effects import ports_of
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import control  # type: ignore[import-untyped]
 
 __all__ = ["initial_state", "iosystem"]
-
-Array = NDArray[np.float64]
 
 
 def iosystem(

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import one_of, positive
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.control._at_rest import (
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LinearController", "LinearModel", "equilibrium", "linear_controller", "linearise"]
 
-Array = NDArray[np.float64]
 
 SIDES: Final = ("mean", "fill", "vent")
 FRICTIONS: Final = ("rest", "moving")

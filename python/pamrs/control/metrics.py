@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, refused
 from pamrs.control._values import angle_factor, times_of
 from pamrs.errors import ParameterError
@@ -35,7 +35,6 @@ __all__ = [
     "total_curvature",
 ]
 
-Array = NDArray[np.float64]
 
 #: Of (4.18): squared error, curvature.
 WEIGHTS: Final = (0.25, 0.75)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import one_of, positive
 from pamrs.control._protocol import Controller
 from pamrs.control.linear import LinearController, LinearModel, linear_controller, python_control
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Margins", "margins", "open_loop"]
 
-Array = NDArray[np.float64]
 #: Frequencies of a response, from a millionth of the Nyquist frequency to itself.
 _POINTS: Final = 4000
 

@@ -1,4 +1,4 @@
-"""Where the joint should be over time: the trajectories of chapters 4, 5 and 6, steps, and a user's
+"""Where the joint should be over time: the trajectories of chapters 4 and 6, steps, and a user's
 table.
 
 All angles are radians in and out (``numpy.deg2rad`` or :func:`pamrs.control.trajectories.degrees`
@@ -13,25 +13,23 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, finite, matched, misshapen, positive, quantities, whole
 from pamrs.control._protocol import Reference
 from pamrs.control._values import times_of
 from pamrs.errors import ParameterError
 
 __all__ = [
-    "TABLE_5_1",
     "JointTrajectories",
     "Trajectory",
     "check_reach",
-    "compound",
     "cosine_cycles",
     "degrees",
     "from_samples",
@@ -39,17 +37,12 @@ __all__ = [
     "step",
 ]
 
-Array = NDArray[np.float64]
-
-#: Amplitude [deg] and angular frequency [rad/s] of the sinusoids of (5.24).
-TABLE_5_1 = ((20.0, 0.70), (13.0, 0.95), (7.0, 1.55), (5.0, 0.80))
-
 
 #: No joint of a rig turns farther either way [rad].
 MOST_ANGLE = 7.0
 
 
-class _Shape(Protocol):
+class Shape(Protocol):
     """An angle over time with two derivatives."""
 
     def at(self, time: float) -> tuple[float, float, float]:
@@ -61,7 +54,7 @@ class _Shape(Protocol):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A reference over time, made by the functions of this module.
+    """A reference over time, made by the functions of this module or from a shape of one's own.
 
     Calling it with a time [s] gives a :class:`pamrs.control.Reference` of floats, with an array of
     times one of arrays of that shape.
@@ -73,13 +66,16 @@ class Trajectory:
     duration : float
         Length of the record [s]. Past it a trajectory goes on as its function says (it holds, or
         repeats).
+    shape : object
+        ``at(time)`` of a float and ``over(times)`` of an array, both [s]: each answers angle [rad],
+        rate [rad/s] and acceleration [rad/s^2], of floats or of arrays of that shape.
     phases : mapping of str to (float, float)
         Named parts of the record: begin and end [s].
     """
 
     name: str
     duration: float
-    _shape: _Shape = field(repr=False)
+    shape: Shape = field(repr=False)
     phases: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __call__(self, time: float | Array) -> Reference:
@@ -104,9 +100,9 @@ class Trajectory:
                 raise ParameterError(
                     "time is not finite: every entry has to be a finite number of seconds"
                 )
-            return Reference(*self._shape.over(time))
+            return Reference(*self.shape.over(time))
         finite("time", time)
-        return Reference(*self._shape.at(time))
+        return Reference(*self.shape.at(time))
 
     @quantities
     def sampled(self, sample_time: float, duration: float | None = None) -> tuple[Array, Reference]:
@@ -209,44 +205,6 @@ class _Pieces:
     @cached_property
     def _arrays(self) -> tuple[Array, Array]:
         return np.asarray(self.starts, dtype=np.float64), np.asarray(self.cubics, dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class _Waves:
-    """Cosines, a triangle wave and a bias; goes on for ever."""
-
-    cosines: tuple[tuple[float, float], ...]  # rad, rad/s
-    bias: float  # rad, the triangle's mean within
-    height: float  # rad, peak to peak
-    frequency: float  # Hz
-
-    def at(self, time: float) -> tuple[float, float, float]:
-        angle, rate, acceleration = self.bias, 0.0, 0.0
-        for size, w in self.cosines:
-            c = size * math.cos(w * time)
-            angle += c
-            rate -= size * w * math.sin(w * time)
-            acceleration -= w * w * c
-        turn = self.frequency * time % 1.0
-        rising = turn < 0.5
-        angle += self.height * ((2.0 * turn if rising else 2.0 - 2.0 * turn) - 0.5)
-        return angle, rate + (2.0 if rising else -2.0) * self.height * self.frequency, acceleration
-
-    def over(self, time: Array) -> tuple[Array, Array, Array]:
-        angle, rate, acceleration = (np.full(time.shape, start) for start in (self.bias, 0.0, 0.0))
-        for size, w in self.cosines:
-            c = size * np.cos(w * time)
-            angle += c
-            rate -= size * w * np.sin(w * time)
-            acceleration -= w * w * c
-        turn = self.frequency * time % 1.0
-        rising = turn < 0.5
-        angle += self.height * (np.where(rising, 2.0 * turn, 2.0 - 2.0 * turn) - 0.5)
-        return (
-            angle,
-            rate + np.where(rising, 2.0, -2.0) * self.height * self.frequency,
-            acceleration,
-        )
 
 
 @dataclass(frozen=True)
@@ -440,60 +398,6 @@ def step(before: float, after: float, *, at: float = 0.0, duration: float = 5.0)
     # a piece of its own before the step, so that "before" is what holds until then
     pieces = _Pieces((-1.0, at), (rest, moved))
     return Trajectory("step", length, pieces, {"step": (at, length)})
-
-
-@quantities
-def compound(
-    *,
-    cosines: Sequence[tuple[float, float]] | None = None,
-    bias: float = math.radians(50.0),
-    triangle: float = math.radians(20.0),
-    triangle_bias: float = math.radians(10.0),
-    triangle_frequency: float = 0.16,
-    duration: float = 100.0,
-) -> Trajectory:
-    """The compound trajectory (5.24) of chapter 5: ``sum A_i cos(w_i t) + triangle + bias``; it
-    goes on for ever.
-
-    The triangle begins at its lowest value and rises; the dissertation prints frequency, height and
-    bias of it, not its phase.
-
-    Parameters
-    ----------
-    cosines : sequence of (float, float), optional
-        Amplitude [rad] and angular frequency [rad/s] of each; Table 5.1 by default.
-    bias : float
-        [rad]
-    triangle, triangle_bias : float
-        Peak to peak and mean of the triangle [rad].
-    triangle_frequency : float
-        [Hz], at least 0.
-    duration : float
-        Length of the record [s].
-
-    Returns
-    -------
-    Trajectory
-        At the triangle's tips the rate is that of what follows, and the acceleration that of the
-        cosines.
-
-    Raises
-    ------
-    ParameterError
-        If a number is not finite or outside its range.
-    """
-    given = [(math.radians(a), w) for a, w in TABLE_5_1] if cosines is None else cosines
-    waves = tuple(
-        (finite("cosines amplitude", a), finite("cosines frequency", w)) for a, w in given
-    )
-    mean = finite("bias", bias) + finite("triangle_bias", triangle_bias)
-    shape = _Waves(
-        waves,
-        mean,
-        finite("triangle", triangle),
-        positive("triangle_frequency", triangle_frequency, zero=True),
-    )
-    return Trajectory("compound", positive("duration", duration), shape)
 
 
 @quantities

@@ -12,8 +12,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import (
     as_column,
     checked_number,
@@ -36,7 +36,6 @@ from pamrs.rig import Rig, payload_of
 
 __all__ = ["GainMap", "GainSearch", "gain_map", "search_gains"]
 
-Array = NDArray[np.float64]
 Factory = Callable[..., Controller]
 
 

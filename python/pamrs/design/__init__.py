@@ -13,12 +13,10 @@ needs.
 True
 """
 
-from __future__ import annotations
-
 from pamrs.design import sizing
-from pamrs.design._filling import Filling
 from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, least_pressure, optimise
 from pamrs.design._problem import DEFAULT_BOUNDS, LENGTHS, SYMBOLS, JointProblem, Scores
+from pamrs.design.sizing import Filling
 
 __all__ = [
     "AREA_TOLERANCE",

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import positive, refused, whole
 from pamrs.design._problem import LENGTHS, JointProblem, Scores
 from pamrs.rig import Joint
 from pamrs.units import bar_and_psi
 
-Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 #: Area below the threshold that counts as "essentially zero", over the area under the threshold

@@ -7,19 +7,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike, Mask
 from pamrs._checks import check_names, one_of, positive, refused, whole
 from pamrs.errors import ParameterError
-from pamrs.rig import Joint
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
-Array = NDArray[np.float64]
+from pamrs.rig import Joint, Muscle
 
 #: The four lengths, in the order of a design's columns.
 LENGTHS: Final = ("upper_axial", "upper_offset", "lower_axial", "lower_offset")
@@ -64,7 +59,7 @@ class Scores:
     area_below: Array
     area_above: Array
     max_angle: Array
-    available: NDArray[np.bool_]
+    available: Mask
     torque: Array
     contraction: Array
 
@@ -313,7 +308,7 @@ class JointProblem:
             raise ParameterError("designs must hold axial lengths above 0 m")
         return rows
 
-    def _motion(self, designs: ArrayLike) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    def _motion(self, designs: ArrayLike) -> tuple[Array, Array, Array, Mask]:
         """Contraction, moment arm and torque arm at every angle (n, points), NaN out of reach, and
         where the muscle's model holds.
         """
@@ -335,7 +330,7 @@ class JointProblem:
             held = (contraction >= lowest) & (contraction <= highest)
         return contraction, arm, torque_arm, held
 
-    def _turned(self, contraction: Array, arm: Array, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _turned(self, contraction: Array, arm: Array, held: Mask) -> Mask:
         """Where the muscles can turn the joint."""
         with np.errstate(invalid="ignore"):
             return np.asarray(

@@ -7,8 +7,6 @@ Equations, parameters, bounds and sources stand in the core, one file for each e
 (:class:`Term`, :class:`Hypothesis`), and :mod:`pamrs.effects.text`.
 """
 
-from __future__ import annotations
-
 from pamrs.effects._catalogue import (
     CATALOGUE,
     CLOSURE_OF,

@@ -7,8 +7,6 @@ Public: `library`, `experiments_of` (all that a rig can do; as high and as fast 
 references).
 """
 
-from __future__ import annotations
-
 from pamrs.experiments._chains import (
     Chain,
     Range,

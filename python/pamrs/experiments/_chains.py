@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, Mask
 from pamrs.channels import dotted
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
@@ -28,9 +28,6 @@ BANDWIDTH = 15.0  # [rad/s] bandwidth of the pressure loop by which commands are
 # [s] rise of several chains' pressures to find where joints move: slow beside lags
 _RAMP_TIME = 15.0
 
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _LEAST_SHARE = 0.14
 """Least flow that a command is found for, as a share of the choked one: near equal pressures the

@@ -9,8 +9,8 @@ from string import Formatter
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.channels import unit_of
 from pamrs.experiments._chains import driving
 from pamrs.findings import Protocol
@@ -18,7 +18,6 @@ from pamrs.rig import Rig, payload_of
 from pamrs.simulation import Simulation, has_frame, simulate
 from pamrs.units import to_si
 
-Array = NDArray[np.float64]
 #: Units that texts are written in, their SI unit, and digits behind the point.
 _SAID: Final = {"bar": ("Pa", 2), "mm": ("m", 1), "kg": ("kg", 2), "deg": ("rad", 0)}
 

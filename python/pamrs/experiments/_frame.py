@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.channels import dotted
 from pamrs.experiments._chains import Chain, Range, Spans, chains_of, top_of
 from pamrs.recordings import Recording
@@ -29,9 +29,6 @@ _WORTH_STROKE = 0.01  # least stroke worth moving, share of the length: a few ti
 _PULLING_SHARE = 0.05
 # place between shortest and longest length held: near the long end muscles pull early
 _HELD_SHARE = 0.7
-
-
-Array = NDArray[np.float64]
 
 
 class Rates(Protocol):

@@ -16,8 +16,8 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Mask
 from pamrs.channels import dotted
 from pamrs.experiments._chains import (
     BANDWIDTH,
@@ -50,7 +50,6 @@ _FADE_TIME = 3.0  # [s] over which a multisine begins
 _FILLING_TIME = 3.0  # [s] before a load frame moves: 1 s to fill a muscle, the rest to settle
 
 
-Array = NDArray[np.float64]
 Row = Mapping[str, Any]
 Legs = list[tuple[float, float]]
 """Straight lines: how long each takes [s], and the share of a range that it ends at."""
@@ -87,7 +86,7 @@ def _course(legs: Legs, begin: float, span: Range, sample_time: float) -> Array:
     return np.asarray(np.interp(time, ends, [begin, *(span.at(share) for _, share in legs)]))
 
 
-def _shut(row: Row, rows: int, sample_time: float) -> NDArray[np.bool_]:
+def _shut(row: Row, rows: int, sample_time: float) -> Mask:
     """At which of so many samples valves are shut: in the last leg of each level of a row."""
     legs = _legs({**row, "cycles": ()}, ())
     ends = np.cumsum([0.0, *(seconds for seconds, _ in legs)])

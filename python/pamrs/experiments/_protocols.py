@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs.channels import dotted
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -35,9 +34,6 @@ _MOST_SEALED_SAMPLE_TIME = 1.0  # [s] longest sample time of a sealed chamber
 _LEAST_HIGHEST = 2e4
 # samples of a pressure that blows over, which may take 1 s to 60 s (20 ms at most)
 _MOST_BLOWN_SAMPLES = 3000
-
-
-Array = NDArray[np.float64]
 
 
 def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experiment]:

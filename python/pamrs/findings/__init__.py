@@ -12,8 +12,6 @@ of what it has; `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
 become JSON, and `fields_from`, which reads it.
 """
 
-from __future__ import annotations
-
 from pamrs.findings._answer import (
     MENDED,
     MOST_MISSED,
@@ -69,9 +67,8 @@ from pamrs.findings._entries import (
     WrongParameter,
 )
 from pamrs.findings._entry import Entry, fields_from, to_plain
-from pamrs.findings._findings import Findings
+from pamrs.findings._findings import Findings, ModelFile, Trace
 from pamrs.findings._missing import MissingInput, MissingRecording, shown_unit
-from pamrs.findings._trace import ModelFile, Trace
 
 __all__ = [
     "HEALTHY",

@@ -9,11 +9,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from pamrs._arrays import Array
 from pamrs.findings._entry import NOT_WRITTEN, Entry
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +68,13 @@ class Curves(Entry):
     text: str
     channel: str
     unit: str
-    time: FloatArray
-    predicted: Mapping[str, FloatArray] = field(metadata={"key": "values"})
+    time: Array
+    predicted: Mapping[str, Array] = field(metadata={"key": "values"})
     leading: str
-    bin_time: FloatArray
-    left: Mapping[str, FloatArray]
+    bin_time: Array
+    left: Mapping[str, Array]
     noise: float
-    command: FloatArray | None
+    command: Array | None
     samples_counted: float
 
 
@@ -122,8 +120,8 @@ class Protocol(Entry):
     """
 
     name: str
-    time: FloatArray
-    commands: Mapping[str, FloatArray]
+    time: Array
+    commands: Mapping[str, Array]
     units: Mapping[str, str]
 
     def to_csv(self) -> str:

@@ -9,13 +9,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from pamrs._arrays import Array
 from pamrs._views import COLOURS, Panels, View
 from pamrs.channels import read_in
 from pamrs.findings._entry import OPTIONAL, Entry, to_plain
 
-FloatArray = npt.NDArray[np.float64]
 _POINTS = (24, 120)  # of a curve in a picture, and of one over time
 _LETTERS = 76  # of a line above it
 _LEAST_IN_POINT = 4  # values that make one of them
@@ -43,13 +42,13 @@ class MissingRecording(Entry):
 
     recording: str
     role: str
-    time: FloatArray
-    value: FloatArray
-    std: FloatArray
-    arguments: Mapping[str, FloatArray]
+    time: Array
+    value: Array
+    std: Array
+    arguments: Mapping[str, Array]
     noises_before: float
     noises_after: float
-    law: FloatArray | None = field(default=None, metadata=OPTIONAL)
+    law: Array | None = field(default=None, metadata=OPTIONAL)
 
     def __post_init__(self) -> None:
         curves = {n: getattr(self, n) for n in ("time", "value", "std", "law")}
@@ -59,7 +58,7 @@ class MissingRecording(Entry):
         own = {n: np.asarray(v, dtype=np.float64) for n, v in self.arguments.items()}
         object.__setattr__(self, "arguments", own)
 
-    def along(self, argument: str) -> FloatArray:
+    def along(self, argument: str) -> Array:
         """An argument at each value (n,); the time by its name."""
         return self.time if argument == "time" else self.arguments[argument]
 
@@ -67,7 +66,7 @@ class MissingRecording(Entry):
         """Thin it to so many points at most, of six digits."""
         every = slice(None, None, max(1, -(-self.time.size // most)))
 
-        def few(values: FloatArray) -> FloatArray:
+        def few(values: Array) -> Array:
             return np.array([float(f"{v:.6g}") for v in values[every]])
 
         return replace(
@@ -200,7 +199,7 @@ def _draw(found: MissingInput, axes: Any) -> None:
     axes.legend(fontsize="small", frameon=False, title="band: ± 2 std")
 
 
-def _means(columns: Sequence[FloatArray], most: int) -> list[FloatArray]:
+def _means(columns: Sequence[Array], most: int) -> list[Array]:
     """Means of so many groups of points at most along the first column."""
     order = np.argsort(columns[0], kind="stable")
     groups = np.array_split(order, min(most, max(1, order.size // _LEAST_IN_POINT)))

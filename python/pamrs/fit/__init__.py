@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs.errors import FitError
 
 if TYPE_CHECKING:
-    from pamrs.fit._bench import from_recording
     from pamrs.fit._compare import ModelComparison, compare_models
     from pamrs.fit._data import ForceMap
+    from pamrs.fit._files import from_recording
     from pamrs.fit._friction import FrictionFit, fit_friction
     from pamrs.fit._load import MeasuredMuscle, load_force_map, load_measured_muscle
     from pamrs.fit._map import MapFit, fit_map
@@ -46,9 +46,9 @@ __all__ = [
 ]
 
 _NAMES: Final = {
-    "_bench": ("from_recording",),
     "_compare": ("ModelComparison", "compare_models"),
     "_data": ("ForceMap",),
+    "_files": ("from_recording",),
     "_friction": ("FrictionFit", "fit_friction"),
     "_load": ("MeasuredMuscle", "load_force_map", "load_measured_muscle"),
     "_map": ("MapFit", "fit_map"),

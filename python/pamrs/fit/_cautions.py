@@ -9,15 +9,12 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index, Mask
 from pamrs.fit._estimate import Estimate, Problem
 from pamrs.fit._statistics import FitParameter
 from pamrs.units import with_unit
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 Parameters = Mapping[str, FitParameter]
 
 _LARGE_CONDITION: Final = 1e4

@@ -8,18 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index, Mask
 from pamrs.errors import ParameterError, RecordingError
+from pamrs.rig import Muscle
 from pamrs.units import in_words, parse_unit
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
-Array = NDArray[np.float64]
 
 PRESSURE_HIGH: Final = 5e6  # [Pa]; a map whose pressures lie beyond is in another unit
 _PRESSURE_LOW: Final = 2e3
@@ -53,7 +49,7 @@ def check_rest_length(muscle: Muscle, rest_length: float) -> None:
         )
 
 
-def reachable(length: Array, rest: float) -> NDArray[np.bool_]:
+def reachable(length: Array, rest: float) -> Mask:
     """Whether a muscle of this rest length could have each length; True for NaN."""
     ratio = length / rest
     return ~((ratio < _LENGTH_LOW) | (ratio > _LENGTH_HIGH))
@@ -193,7 +189,7 @@ def check_forces(label: str, largest: float, able: float, units: Mapping[str, st
 
 
 def absolute_pressures(
-    pressure: Array, contraction: Array, force: Array, level: NDArray[np.intp], unit: str
+    pressure: Array, contraction: Array, force: Array, level: Index, unit: str
 ) -> list[str]:
     """A note if the forces vanish near ambient pressure, as they do when the pressures are
     absolute.

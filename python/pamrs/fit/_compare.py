@@ -5,26 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import refused
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._cautions import FAR
+from pamrs.fit._data import ForceMap
 from pamrs.fit._design import CONSTANTS, template
 from pamrs.fit._result import MuscleFit
 from pamrs.fit._solution import COEFFICIENTS, fit_muscle, has_effect, level_indices
+from pamrs.rig import Muscle
 from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODELS
 
-if TYPE_CHECKING:
-    from pamrs.fit._data import ForceMap
-    from pamrs.rig import Muscle
-
 _NEAR: Final = 1.25  # times the best leave-one-pressure-out error, for a recommendation
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

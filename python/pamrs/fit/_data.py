@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from pamrs._arrays import Array, ArrayLike, Index, Mask
 from pamrs._checks import positive, quantities, refused
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._checks import (
@@ -25,13 +26,7 @@ from pamrs.fit._checks import (
     reachable,
 )
 from pamrs.fit._ways import table_ways
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
+from pamrs.rig import Muscle
 
 #: Reason of the rows that :meth:`ForceMap.select` leaves out.
 LEFT_OUT: Final = "left out"

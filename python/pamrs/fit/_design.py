@@ -9,20 +9,15 @@ over the levels, that is linear interpolation.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import one_of, refused, whole
 from pamrs.errors import FitError
+from pamrs.rig import Muscle
 from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODELS
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 #: Coefficients of the models without a stress polynomial.
 CONSTANTS: Final[dict[str, tuple[str, ...]]] = {

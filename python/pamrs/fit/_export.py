@@ -8,9 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.errors import missing_package
+from pamrs.rigs import bench
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -91,8 +92,6 @@ def _scatter(fit: MuscleFit) -> str:
 
 def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
     """What :meth:`MuscleFit.to_rig` returns."""
-    from pamrs.rigs import bench
-
     muscle = fit.muscle
     parameters = dict(muscle.parameters)
     if rig is None:
@@ -115,7 +114,7 @@ def _kept(name: str, value: float, muscle: Mapping[str, Any]) -> bool:
     return block != "muscle" or muscle.get(key) == value
 
 
-def to_lmfit(params: Mapping[str, Any], covar: NDArray[np.float64]) -> Any:
+def to_lmfit(params: Mapping[str, Any], covar: Array) -> Any:
     """What :meth:`MuscleFit.to_lmfit` and :meth:`FrictionFit.to_lmfit` return.
 
     Parameters

@@ -8,8 +8,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, Normalize
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index
 from pamrs.errors import FitError
 from pamrs.report.figures import COLOURS, summary_figure
 from pamrs.report.text import format_number
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
     from pamrs.fit._result import MuscleFit
 
-Array = NDArray[np.float64]
 
 _QUIET, _INK = "#9aa3af", "#374151"
 _MOST_POINTS = 3000
@@ -69,7 +68,7 @@ def _pressure_colours(levels: Array) -> tuple[Any, Normalize]:
     )
 
 
-def _thinned(rows: NDArray[np.intp]) -> NDArray[np.intp]:
+def _thinned(rows: Index) -> Index:
     """At most ``_MOST_POINTS`` of some rows, evenly."""
     if len(rows) <= _MOST_POINTS:
         return rows

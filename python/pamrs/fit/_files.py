@@ -1,4 +1,4 @@
-"""Reads force maps from tables with units in their headings."""
+"""Reads force maps from tables with units in their headings, and from recordings."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Mask
 from pamrs.errors import ParameterError, RecordingError, joined
-from pamrs.fit._bench import from_recording
 from pamrs.fit._data import ForceMap
-from pamrs.recordings import load_recording
+from pamrs.fit._ways import series_ways
+from pamrs.recordings import Recording, load_recording
 from pamrs.recordings.calibration import KEYS, Calibration, read_calibration
 from pamrs.recordings.dialect import check_marks, decimal_of, dialect_of
 from pamrs.recordings.logs import read_log, table_of
@@ -27,8 +27,6 @@ from pamrs.recordings.table import (
     stem_of,
 )
 from pamrs.units import parse_unit, same_dimension, to_si
-
-Array = NDArray[np.float64]
 
 # channel -> SI unit
 _UNITS: Final = {
@@ -357,7 +355,7 @@ def _cells(table: Table, heading: str, source: str) -> list[str]:
 
 def _kept(
     table: Table, where: Mapping[str, str], decimal: str, source: str
-) -> tuple[NDArray[np.bool_], list[str]]:
+) -> tuple[Mask, list[str]]:
     """Rows that ``where`` asks for, and a note about the others."""
     keep = np.ones(len(table.row_numbers), dtype=bool)
     for heading, value in where.items():
@@ -414,3 +412,59 @@ def _channels(table: Table, found: Mapping[str, _Column]) -> list[str]:
         elif channel != "direction":
             headings[index] = f"{channel} [{unit}]"
     return headings
+
+
+def from_recording(
+    recording: Recording,
+    *,
+    rest_length: float,
+    clipped: float | None = None,
+    level_tolerance: float | None = None,
+) -> ForceMap:
+    """A force map from a bench's recording: slow length cycles at held pressures, or slow pressure
+    cycles at held lengths (where rising pressure counts as contracting).
+
+    Parameters
+    ----------
+    recording : Recording
+        With the channels length, force and muscle_pressure (or reference, a pressure that is set).
+    rest_length : float
+        Length at zero contraction [m].
+    clipped, level_tolerance : float, optional
+        As in :meth:`ForceMap.from_arrays`.
+
+    Returns
+    -------
+    ForceMap
+        One row for each sample. The direction is that of the stroke between two turning points;
+        near the turns, where the smoothed length moves at less than a tenth of its usual speed, it
+        is 0. Masked samples are flagged.
+
+    Raises
+    ------
+    RecordingError
+        If a channel is missing or fewer than two samples are usable.
+    """
+    pressure = "muscle_pressure" if "muscle_pressure" in recording.channels else "reference"
+    needed = ("length", pressure, "force")
+    lacking = [channel for channel in needed if channel not in recording.channels]
+    if lacking:
+        raise RecordingError(
+            f"recording {recording.name!r} has no channel {lacking[0]!r}; it has: "
+            f"{', '.join(recording.channels)}"
+        )
+    return ForceMap.from_arrays(
+        length=recording.channels["length"],
+        pressure=recording.channels[pressure],
+        force=recording.channels["force"],
+        rest_length=rest_length,
+        direction=series_ways(
+            recording.channels["length"], recording.channels[pressure], rest_length
+        ),
+        clipped=clipped,
+        level_tolerance=level_tolerance,
+        faulty=~recording.valid(*needed),
+        check_duplicates=False,
+        name=recording.name,
+        notes=[f"{issue.channel} at {issue.start:g} s: {issue.text}" for issue in recording.issues],
+    )

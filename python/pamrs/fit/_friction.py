@@ -10,25 +10,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from pamrs._arrays import Array, ArrayLike, Index, Mask
 from pamrs._checks import refused
 from pamrs._views import COLOURS, Panels, View
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.findings import to_plain
 from pamrs.fit._data import ForceMap
+from pamrs.fit._export import to_lmfit
 from pamrs.fit._validation import WEAK
 from pamrs.fit._ways import held_lengths
 from pamrs.fit.levels import LawParameter, LevelLine, fit_levels
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from pamrs.rig import Muscle
 
 _FEWEST: Final = 4  # rows of a branch
 _BINS: Final = 200  # of a branch's contraction: rows nearer than that are averaged
@@ -212,16 +209,6 @@ class FrictionFit(View):
         c0, c1 = (item.value for item in self._law())
         return np.maximum(c0 + c1 * p, self.floor)
 
-    def mean_curve(self) -> tuple[Array, Array, Array]:
-        """Pressure [Pa], contraction [1] and mean force of both branches [N] of all levels: data
-        free of friction.
-        """
-        keys = ("pressures", "contraction", "force")
-        pressure, contraction, force = (
-            np.concatenate([getattr(level, key) for level in self.levels]) for key in keys
-        )
-        return pressure, contraction, force
-
     def to_muscle(self, muscle: Muscle) -> Muscle:
         """The muscle with this friction.
 
@@ -251,8 +238,6 @@ class FrictionFit(View):
         MissingPackageError
             If lmfit is not installed.
         """
-        from pamrs.fit._export import to_lmfit
-
         return to_lmfit(self.params, self.covar)
 
     def fit_report(self) -> str:
@@ -401,9 +386,7 @@ _NO_WAY: Final = (
 """What a map without directions needs."""
 
 
-def _isometric_levels(
-    data: ForceMap, held: list[NDArray[np.intp]]
-) -> tuple[list[FrictionLevel], list[str]]:
+def _isometric_levels(data: ForceMap, held: list[Index]) -> tuple[list[FrictionLevel], list[str]]:
     """The loops of pressure cycles at held lengths, by bands of pressure.
 
     The law (2.36) is about motion between the fittings; held, the braid still slides where the
@@ -621,7 +604,7 @@ def _presliding(data: ForceMap, levels: list[FrictionLevel]) -> tuple[float | No
     return None, f"not determinable: {few}"
 
 
-def _runs(level: NDArray[np.intp], way: NDArray[np.int8], turn: int) -> tuple[slice, slice]:
+def _runs(level: Index, way: NDArray[np.int8], turn: int) -> tuple[slice, slice]:
     """The rows of one direction before and after a turn, within its level."""
     same = (level == level[turn]) & (way == way[turn])
     stop = turn + int(np.argmin(same[turn:])) if not same[turn:].all() else len(way)

@@ -6,15 +6,15 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Final, NamedTuple
 
-from pamrs.errors import ParameterError
+from pamrs._files import is_inside, toml_document
+from pamrs.declared import Rule, holds, is_finite, is_text, problems_of
+from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.fit._data import ForceMap
-from pamrs.fit._description import read_description
 from pamrs.fit._files import Columns, read_map
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
+from pamrs.rig import Muscle, Reader, muscle_problems
+from pamrs.rig.muscle_models import models_with
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,3 +148,144 @@ def load_measured_muscle(
     return MeasuredMuscle(
         data.checked_against(found.muscle), found.muscle, found.tolerance, found.noise, found.text
     )
+
+
+SCHEMA: Final = "pamrs.force_map/1"
+_TOP: Final = {
+    "schema": Rule(lambda value: value == SCHEMA, repr(SCHEMA)),
+    **dict.fromkeys(
+        ("name", "description", "source", "file", "delimiter", "decimal"), Rule(is_text, "a text")
+    ),
+    "columns": Rule(
+        holds((list, Mapping), lambda value: isinstance(value, (str, Mapping))),
+        "a table of texts, or a list of one for each column",
+    ),
+    "where": Rule(
+        holds(Mapping, lambda value: isinstance(value, (str, bool)) or is_finite(value)),
+        "a table of texts",
+    ),
+    **dict.fromkeys(("clipped_force", "level_tolerance", "noise", "muscle"), Rule(None, "")),
+}
+
+#: Moduli of a muscle whose moduli a fit is to find, in the order that it takes unless told
+#: otherwise.
+NO_MODULI: Final = (0.0, 0.0, 0.0, 0.0)
+_ZEROS: Final[dict[str, Any]] = {
+    "modulus_slope": {"value": list(NO_MODULI), "unit": "1"},
+    "modulus_offset": {"value": list(NO_MODULI), "unit": "Pa"},
+    "c10": {"value": 0.0, "unit": "Pa"},
+    "bladder_modulus": {"value": 0.0, "unit": "Pa"},
+}
+
+
+class Description(NamedTuple):
+    """What a description says.
+
+    Attributes
+    ----------
+    table : Path
+        Where the table is.
+    options : dict
+        How to read it: arguments of :func:`pamrs.fit.load_force_map`.
+    muscle : Muscle
+        Geometry, and the force model to start from.
+    tolerance : dict of str to float
+        Standard deviation of what is known of a number, SI; infinite where it is unknown.
+    noise : float or None
+        Standard deviation of the forces [N].
+    text : str
+        What it says about the measurements.
+    """
+
+    table: Path
+    options: dict[str, Any]
+    muscle: Muscle
+    tolerance: dict[str, float]
+    noise: float | None
+    text: str
+
+
+def read_description(file: Path, *, allow_outside: bool = False) -> Description:
+    """Read a ``pamrs.force_map/1`` file, but not yet its table.
+
+    Parameters
+    ----------
+    file : Path
+        The TOML file.
+    allow_outside : bool
+        Whether its table may lie outside its folder.
+
+    Returns
+    -------
+    Description
+
+    Raises
+    ------
+    RecordingError
+        With every problem found in it.
+    """
+    document = toml_document(file, RecordingError)
+    reader = Reader()
+    reader.problems += problems_of("", document, _TOP, needed=("schema",))
+    if "file" not in document:
+        reader.problem("file is missing: the table with the measurements")
+    clipped = _quantity(reader, document, "clipped_force", "N")
+    tolerance = _quantity(reader, document, "level_tolerance", "Pa")
+    noise = _quantity(reader, document, "noise", "N")
+    block = document.get("muscle")
+    model: dict[str, Any] = {}
+    if isinstance(block, Mapping):
+        model = reader.block("muscle", with_moduli(block))
+        if not reader.problems:
+            reader.problems += muscle_problems("muscle", model, reader.units)
+    else:
+        reader.problem("the block [muscle] is missing: the muscle's geometry, as in a rig file")
+    if reader.problems:
+        raise RecordingError(joined(str(file), reader.problems))
+    texts = {key: document.get(key, "") for key, rule in _TOP.items() if rule.accepts is is_text}
+    where = {key: str(value) for key, value in document.get("where", {}).items()}
+    table = Path(os.path.normpath(file.parent / texts["file"]))
+    if not (allow_outside or "\0" in texts["file"] or is_inside(file.parent, table)):
+        raise RecordingError(
+            f"{file}: file = {texts['file']!r}: lies outside the folder of the description; copy "
+            "it there, or allow it with --allow-outside (in Python: load_measured_muscle(..., "
+            "allow_outside=True))"
+        )
+    if not table.exists():
+        advice = texts["source"] or "correct file in the description"
+        raise RecordingError(
+            f"{file}: file = {texts['file']!r}: there is no file {table}; {advice}"
+        )
+    options = {
+        "rest_length": model["rest_length"],
+        "columns": document.get("columns", {}),
+        "where": where or None,
+        "clipped": clipped,
+        "level_tolerance": tolerance,
+        "delimiter": texts["delimiter"] or None,
+        "decimal": texts["decimal"] or None,
+        "name": texts["name"] or file.stem,
+    }
+    known = {name.partition(".")[2]: spread for name, spread in reader.tolerances.items()}
+    return Description(table, options, Muscle.from_model(model), known, noise, texts["description"])
+
+
+def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:
+    """A ``[muscle]`` block with zeros where it leaves out the moduli of its model, which a fit is
+    to find.
+    """
+    model = str(block.get("model", "robinson"))
+    zeros = {key: value for key, value in _ZEROS.items() if model in models_with(key)}
+    return {**zeros, **block}
+
+
+def _quantity(reader: Reader, document: Mapping[str, Any], key: str, unit: str) -> float | None:
+    """``{ value, unit }`` in SI, None where there is none or after noting what is wrong with it."""
+    raw = document.get(key)
+    if raw is None:
+        return None
+    whole = isinstance(raw, Mapping) and set(raw) == {"value", "unit"}
+    if not (whole and isinstance(raw["unit"], str)):
+        reader.problem(f"{key} = {raw!r} is not allowed: write {{ value = ..., unit = {unit!r} }}")
+        return None
+    return reader.scalar(key, unit, raw["value"], raw["unit"], -1e9, 1e9)

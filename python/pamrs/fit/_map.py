@@ -12,22 +12,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index, Mask
 from pamrs._checks import contraction_of, matched, refused
 from pamrs._views import Panels, View
 from pamrs.errors import RecordingError
 from pamrs.findings import to_plain
 from pamrs.fit._checks import check_rest_length
 from pamrs.fit._data import ForceMap
-
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle, Rig
-
-Array = NDArray[np.float64]
+from pamrs.rig import Muscle, Rig, force_table
+from pamrs.rig.schema import keys_of
+from pamrs.rigs import bench
 
 _MOST_LEVELS: Final = 24
 """Pressure levels that are nodes themselves; of more, as in a ramp, this many are taken."""
@@ -169,9 +168,6 @@ class MapFit(View):
         -------
         Rig
         """
-        from pamrs.rig.schema import keys_of
-        from pamrs.rigs import bench
-
         own = self.to_muscle(muscle)
         if rig is None:
             rig = bench(own)
@@ -290,8 +286,6 @@ def _levels(data: ForceMap) -> Array:
 
 
 def _predict(pressure: Array, contraction: Array, force: Array, gas: Array, e: Array) -> Array:
-    from pamrs.rig import force_table
-
     found = force_table(pressure, contraction, force)
     flat = (np.ascontiguousarray(values.ravel()) for values in (gas, e))
     return found(*flat).reshape(gas.shape)
@@ -323,7 +317,7 @@ def _table(pressure: Array, contraction: Array, gas: Array, e: Array, pull: Arra
     return np.column_stack([_isotonic(column, trust) for column in falling.T])
 
 
-def _place(axis: Array, values: Array) -> tuple[NDArray[np.intp], Array]:
+def _place(axis: Array, values: Array) -> tuple[Index, Array]:
     """Interval of each value, and where in it."""
     cell = np.clip(np.searchsorted(axis, values, side="right") - 1, 0, len(axis) - 2)
     return cell, (values - axis[cell]) / (axis[cell + 1] - axis[cell])
@@ -361,7 +355,7 @@ def _isotonic(values: Array, weights: Array) -> Array:
     return np.repeat(means, counts)
 
 
-def _branches(way: NDArray[np.int8]) -> list[NDArray[np.bool_]]:
+def _branches(way: NDArray[np.int8]) -> list[Mask]:
     """Rows of either direction, where most have one; else all rows."""
     both = [way < 0, way > 0]
     if min(rows.sum() for rows in both) >= _SHARE * len(way):

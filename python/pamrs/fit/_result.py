@@ -6,26 +6,24 @@ import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import contraction_of, matched, one_of, quantities
 from pamrs._views import Panels, View
 from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError
+from pamrs.fit._data import ForceMap
 from pamrs.fit._design import friction_factor
-from pamrs.fit._estimate import geometry_slopes
+from pamrs.fit._export import fit_report, to_dict, to_lmfit, to_rig
 from pamrs.fit._statistics import FitStatistics, determination
 from pamrs.fit._validation import CrossValidation, PressureErrors, leave_one_out, summary
+from pamrs.rig import Rig
 from pamrs.units import with_unit
 
-if TYPE_CHECKING:
-    from pamrs.fit._data import ForceMap
-    from pamrs.rig import Muscle, Rig
-
-Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
 
 #: Bits of the flags of :meth:`MuscleFit.outside`.
@@ -225,53 +223,6 @@ class MuscleFit(View, FitStatistics):
         force = gas + columns @ self._estimate.x
         return np.asarray(force * friction_factor(blank, flat_p, flat_d, force)).reshape(p.shape)
 
-    def predict_std(
-        self,
-        pressure: ArrayLike,
-        contraction: ArrayLike | None = None,
-        *,
-        length: ArrayLike | None = None,
-        new_point: bool = False,
-    ) -> Array:
-        """Standard error of the predicted force [N], from ``covar``.
-
-        Parameters
-        ----------
-        pressure, contraction, length : array_like
-            As in :meth:`predict`.
-        new_point : bool
-            Add the scatter of a single measurement (:attr:`noise`; only with ``weights="force"``).
-
-        Returns
-        -------
-        ndarray
-            In the broadcast shape. It knows the scatter and the priors, not the model's own error
-            beyond the fitted range.
-        """
-        p, e, d = self._points(pressure, contraction, length, None)
-        shape, p, d = p.shape, p.ravel(), d.ravel()
-        lengths = (1.0 - e.ravel()) * self._estimate.blank.parameters["rest_length"]
-        design, x = self._estimate.design, self._estimate.x
-        weights = design.weights(p)
-
-        def force(muscle: Muscle) -> Array:
-            contraction = 1.0 - lengths / muscle.parameters["rest_length"]
-            gas, columns = design.columns(muscle, p, contraction, d, weights)
-            return np.asarray(gas + columns @ x)
-
-        _, columns = design.columns(self._estimate.blank, p, e.ravel(), d, weights)
-        moved = geometry_slopes(self._problem, self._estimate.geometry, force, len(p))
-        slopes = np.hstack([columns, moved])
-        variance = np.einsum("ni,ij,nj->n", slopes, self.covar, slopes)
-        if new_point:
-            if self.weights != "force":
-                raise ParameterError(
-                    "new_point = True needs a fit with weights='force': the scatter is one number "
-                    "in N only there"
-                )
-            variance = variance + self.noise**2
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0))).reshape(shape)
-
     def score(self, data: ForceMap | None = None) -> float:
         """Coefficient of determination R² of the predictions on a map.
 
@@ -317,8 +268,6 @@ class MuscleFit(View, FitStatistics):
         FitError
             When the moduli are free at each level.
         """
-        from pamrs.fit._export import to_rig
-
         return to_rig(self, rig)
 
     def to_lmfit(self) -> Any:
@@ -330,14 +279,10 @@ class MuscleFit(View, FitStatistics):
         MissingPackageError
             If lmfit is not installed.
         """
-        from pamrs.fit._export import to_lmfit
-
         return to_lmfit(self.params, self.covar)
 
     def to_dict(self) -> dict[str, Any]:
         """The fit as plain numbers and text, ready for JSON."""
-        from pamrs.fit._export import to_dict
-
         return to_dict(self)
 
     def figure(self, path: str | os.PathLike[str]) -> Path:
@@ -348,8 +293,6 @@ class MuscleFit(View, FitStatistics):
 
     def fit_report(self) -> str:
         """The fit in words and numbers, for a terminal."""
-        from pamrs.fit._export import fit_report
-
         return fit_report(self)
 
     def __repr__(self) -> str:

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Mask
+from pamrs.fit._data import ForceMap
 from pamrs.fit._estimate import Estimate, Free, Problem
-
-if TYPE_CHECKING:
-    from pamrs.fit._data import ForceMap
-    from pamrs.rig import Muscle
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from pamrs.rig import Muscle
 
 
 @dataclass(frozen=True)

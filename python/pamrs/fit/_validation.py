@@ -6,14 +6,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index, Mask
 from pamrs.errors import FitError
 from pamrs.fit._estimate import Estimate, Problem, refitted
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 
 #: Share of the map's largest force below which a level's own largest force is no scale for its
 #: errors.
@@ -42,7 +38,7 @@ class PressureErrors:
     """
 
     levels: Array
-    points: NDArray[np.intp]
+    points: Index
     rms: Array
     max: Array
     fitted: Mask
@@ -124,7 +120,7 @@ class CrossValidation:
     by_pressure: PressureErrors
     predicted: Array
     residual: Array
-    level: NDArray[np.intp]
+    level: Index
     rms: float
     max: float
     interior_rms: float | None
@@ -216,7 +212,7 @@ def _gone(problem: Problem, level: int, why: str) -> FitError:
     )
 
 
-def _by_hat_matrix(problem: Problem, result: Estimate, level: NDArray[np.intp]) -> Array:
+def _by_hat_matrix(problem: Problem, result: Estimate, level: Index) -> Array:
     if not result.jacobian.shape[1]:
         return result.residual
     scaled = result.jacobian / np.linalg.norm(result.jacobian, axis=0)

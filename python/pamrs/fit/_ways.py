@@ -7,10 +7,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from pamrs._arrays import Array, Index
 
 _HELD: Final = 0.005  # of the rest length: within it a length is held, a frame that yields included
 _CYCLED: Final = 0.1  # of the largest pressure: what the pressure does while a length is held

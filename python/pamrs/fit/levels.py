@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pamrs._arrays import solve_normal
+from pamrs._arrays import Array, solve_normal
 
 __all__ = ["LawParameter", "LevelLine", "fit_levels"]
 
-Array = NDArray[np.float64]
 
 _STEPS: Final = 80  # halvings of the interval in which the extra scatter is sought
 _EXACT: Final = 1e-9  # relative: no mean is known better

@@ -8,8 +8,6 @@ likely which channel, :func:`suspicions` which units physics contradicts.
 of every format, :mod:`pamrs.recordings.calibration` what their numbers stand for.
 """
 
-from __future__ import annotations
-
 from pamrs.channels import CHANNELS
 from pamrs.recordings._case import Case, load_case, model_and_case
 from pamrs.recordings._case_keys import CASE_KEYS

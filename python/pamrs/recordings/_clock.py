@@ -6,13 +6,11 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index, Mask
 from pamrs._files import MOST_ROWS
 from pamrs.errors import RecordingError
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Place = int | np.signedinteger
 
 GAP: Final = 1.6  # intervals longer than this many samples are holes
@@ -76,7 +74,7 @@ class Grid:
     def __init__(
         self,
         stamps: Array,
-        rows: NDArray[np.intp],
+        rows: Index,
         step: float,
         usual: float,
         events: list[Event],

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.channels import CHANNELS, channel_of, dotted, with_trait
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
@@ -19,7 +19,6 @@ from pamrs.units import in_words, parse_unit, to_si
 if TYPE_CHECKING:
     from pamrs.recordings._recording import Recording
 
-Array = NDArray[np.float64]
 
 AMBIENT: Final = 101325.0
 PRESSURES: Final = with_trait("pressure")

@@ -11,13 +11,9 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pamrs._arrays import stretches
+from pamrs._arrays import Array, Index, stretches
 from pamrs.channels import CHANNELS
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _WINDOW: Final = 40  # samples of a window in which rest and noise are judged
 _LEAST: Final = 20  # no shorter run is ever suspect
@@ -89,7 +85,7 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
     return faults
 
 
-def _constant(channel: str, data: Array, good: NDArray[np.intp]) -> list[Fault]:
+def _constant(channel: str, data: Array, good: Index) -> list[Fault]:
     if len(data) < _LEAST:
         return []
     masked = CHANNELS[channel].has("clips") and not CHANNELS[channel].has("steady")
@@ -97,7 +93,7 @@ def _constant(channel: str, data: Array, good: NDArray[np.intp]) -> list[Fault]:
     return [Fault("constant", int(good[0]), int(good[-1]) + 1, text, masked)]
 
 
-def _rails(data: Array, good: NDArray[np.intp]) -> list[Fault]:
+def _rails(data: Array, good: Index) -> list[Fault]:
     """Dropouts: runs at one end of the range, entered and left by leaps that the channel makes
     nowhere else, after which it goes on where it was.
     """
@@ -123,7 +119,7 @@ def _rails(data: Array, good: NDArray[np.intp]) -> list[Fault]:
     return found
 
 
-def _fault(kind: str, good: NDArray[np.intp], start: int, stop: int, text: str) -> Fault:
+def _fault(kind: str, good: Index, start: int, stop: int, text: str) -> Fault:
     """A fault of the channel, from samples of its good rows."""
     return Fault(kind, int(good[start]), int(good[stop - 1]) + 1, text)
 
@@ -136,7 +132,7 @@ def _dropped(data: Array, start: int, stop: int, usual: float) -> bool:
     return bool(leaps) and min(leaps) > _RAIL_LEAP * usual and same
 
 
-def _outliers(data: Array, good: NDArray[np.intp]) -> list[Fault]:
+def _outliers(data: Array, good: Index) -> list[Fault]:
     """Spikes of one or two samples that stand off from both sides."""
     n = len(data)
     if n < _LEAST:
@@ -269,9 +265,9 @@ class _Stretches:
         return len(slopes) > 0 and max(slopes) > usual and math.isinf(self.limit)
 
 
-def _skipped_reversals(signs: Array) -> NDArray[np.intp]:
+def _skipped_reversals(signs: Array) -> Index:
     """Reversals across one or two equal samples: up, still, down."""
     one = (signs[:, 2:] * signs[:, :-2] < 0) & (signs[:, 1:-1] == 0)
     two = (signs[:, 3:] * signs[:, :-3] < 0) & (signs[:, 2:-1] == 0) & (signs[:, 1:-2] == 0)
-    total: NDArray[np.intp] = np.sum(one, axis=1) + np.sum(two, axis=1)
+    total: Index = np.sum(one, axis=1) + np.sum(two, axis=1)
     return total

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from pamrs._arrays import Array
 from pamrs.channels import CHANNELS, channel_of
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.recordings._case_keys import ROLES
-from pamrs.recordings._clock import Array
 from pamrs.recordings._doubts import made_gauge
 from pamrs.recordings._mapping import Clock, Source, read_clock, read_sources
 from pamrs.recordings._recording import Issue, Recording

@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import as_said, is_quantity, misshapen, plain
 from pamrs.channels import unit_of
 from pamrs.errors import CaseError, ParameterError, joined
 from pamrs.recordings._headed import HEADING
 
-Array = NDArray[np.float64]
 _NUMBERS = "biuf"  # kinds of arrays that are numbers
 _DATES = "mM"  # kinds that are times
 _MIXED = "OU"  # kinds that may be numbers among other things

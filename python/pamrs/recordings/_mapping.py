@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.channels import CHANNELS, channel_of
 from pamrs.declared import problems_of
 from pamrs.errors import ParameterError, RecordingError, joined, meant
@@ -17,8 +17,6 @@ from pamrs.recordings._case_keys import CHANNEL, CLOCK, CONSTANT
 from pamrs.recordings._doubts import unit_trouble
 from pamrs.recordings.calibration import Calibration, read_calibration
 from pamrs.units import measured_from, parse_unit, to_si
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

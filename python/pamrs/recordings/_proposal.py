@@ -11,11 +11,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from pamrs._arrays import Array
 from pamrs._checks import positive
 from pamrs._files import resolved, shown
 from pamrs.channels import CHANNELS, channel_of
 from pamrs.errors import RecordingError
-from pamrs.recordings._clock import Array, usual_interval
+from pamrs.recordings._clock import usual_interval
 from pamrs.recordings._doubts import suspicions
 from pamrs.recordings._from_log import Clocks
 from pamrs.recordings._mapping import Clock

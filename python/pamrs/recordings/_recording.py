@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pamrs._arrays import stretches
+from pamrs._arrays import Array, Mask, stretches
 from pamrs._checks import quantities
 from pamrs._files import MOST_NAME, shown
 from pamrs._tables import Columns, Tabular
@@ -26,15 +25,8 @@ from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Grid, lay_grid
 from pamrs.recordings._doubts import suspicions
 from pamrs.recordings._faults import Fault, find_faults
-from pamrs.rig import full_name, named_entries
+from pamrs.rig import Rig, full_name, named_entries
 from pamrs.units import in_words
-
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 
 _FEW: Final = 20
 

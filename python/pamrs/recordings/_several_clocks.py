@@ -7,19 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index, Mask
 from pamrs.channels import channel_of, with_trait
 from pamrs.errors import RecordingError
-from pamrs.recordings._clock import (
-    GAP,
-    Array,
-    Grid,
-    Mask,
-    check_samples,
-    gaps,
-    usual_interval,
-)
+from pamrs.recordings._clock import GAP, Grid, check_samples, gaps, usual_interval
 from pamrs.recordings._recording import Issue, Laid, Recording, assemble, composed
 from pamrs.recordings._stamps import Rows, Ticks, filled_rows, spread, unwound
 
@@ -282,7 +274,7 @@ def on_one_clock(
     return composed(name, role, laid, issues, source, units)
 
 
-def _rising(channel: Sampled, source: str) -> NDArray[np.intp]:
+def _rising(channel: Sampled, source: str) -> Index:
     """Rows whose times differ from the row before; the last one of events at the same time."""
     intervals = np.diff(channel.time)
     if np.any(intervals < 0.0):

@@ -9,8 +9,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from pamrs._arrays import Array
 from pamrs.errors import RecordingError
-from pamrs.recordings._clock import Array
 from pamrs.recordings._several_clocks import Sampled
 from pamrs.recordings._stamps import Ticks
 

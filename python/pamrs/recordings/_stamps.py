@@ -9,13 +9,12 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index
 from pamrs.recordings._clock import GAP
 from pamrs.units import parse_unit
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
+Rows = Index
 
 #: Unit of the words by which series of times are called.
 TIME_UNITS: Final = {

@@ -7,13 +7,12 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.declared import is_finite
 
 __all__ = ["KEYS", "Calibration", "read_calibration"]
 
-Array = NDArray[np.float64]
 
 #: Keys of an entry that say a calibration.
 KEYS: Final = ("scale", "offset", "from", "to")

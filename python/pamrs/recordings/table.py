@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._files import MOST_SIZE, read_file
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import check_size
@@ -43,7 +43,6 @@ __all__ = [
     "usual_width",
 ]
 
-Array = NDArray[np.float64]
 
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
 #: Endings of files that are read as text; each may be packed (``.gz``).

@@ -14,10 +14,10 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pamrs._arrays import Array
 from pamrs._views import decimate
 from pamrs.findings import YOURS, Curves, Findings, MissingInput, Trace
 from pamrs.report.text import (
@@ -61,7 +61,6 @@ print)."""
 MOST_FREE = 3
 """Channels of the whole rig that are drawn at most."""
 
-FloatArray = npt.NDArray[np.float64]
 
 STYLE: Any = {
     "text.parse_math": False,  # names of recordings are no formulas
@@ -96,20 +95,20 @@ _SMALL: Any = {"font.size": 8.5, "legend.fontsize": 8.0, "axes.labelsize": 8.5}
 """Those of a summary that are others."""
 
 
-def _rms(values: FloatArray | None) -> float:
+def _rms(values: Array | None) -> float:
     if values is None or not np.any(np.isfinite(values)):
         return math.nan
     return float(np.sqrt(np.nanmean(np.square(values))))
 
 
-def _largest(*curves: FloatArray | None) -> float:
+def _largest(*curves: Array | None) -> float:
     sizes = [
         float(np.nanmax(np.abs(c))) for c in curves if c is not None and np.any(np.isfinite(c))
     ]
     return max(sizes, default=math.nan)
 
 
-def _has(values: FloatArray | None, besides: FloatArray | None = None) -> bool:
+def _has(values: Array | None, besides: Array | None = None) -> bool:
     """Whether a curve has data and differs from another one."""
     if values is None or not np.any(np.isfinite(values)):
         return False
@@ -122,8 +121,8 @@ class Line:
 
     name: str
     colour: str
-    x: FloatArray
-    y: FloatArray
+    x: Array
+    y: Array
     width: float = 1.3
     dashed: bool = False
 
@@ -182,7 +181,7 @@ def _quantity(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def _line(name: str, stage: str, time: FloatArray, values: FloatArray, **how: Any) -> Line:
+def _line(name: str, stage: str, time: Array, values: Array, **how: Any) -> Line:
     return Line(name, COLOURS[stage], *decimate(time, values), **how)
 
 
@@ -333,7 +332,7 @@ def missing_svg(missing: MissingInput) -> str:
         return svg_text(figure, "missing")
 
 
-def _short(values: FloatArray) -> list[float | None]:
+def _short(values: Array) -> list[float | None]:
     """Numbers with five digits of their range, null for gaps."""
     known = values[np.isfinite(values)]
     size = float(np.max(np.abs(known))) if known.size else 0.0

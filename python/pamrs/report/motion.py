@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import refused
 from pamrs._views import decimate
 from pamrs._writing import write_atomically
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from pamrs.simulation import Simulation
 
-Array = NDArray[np.float64]
 
 #: Panels from top to bottom: title and channels, which have one unit; those of which nothing was
 #: simulated are left out.

@@ -7,13 +7,10 @@ keys that a rig file may have, :mod:`pamrs.rig.muscle_models` lists the force mo
 rig.
 """
 
-from __future__ import annotations
-
 from pamrs.rig._checks import muscle_problems
 from pamrs.rig._choices import OtherChoice, other_choices
 from pamrs.rig._joint import Joint
-from pamrs.rig._law import force_table
-from pamrs.rig._muscle import Muscle
+from pamrs.rig._muscle import Muscle, force_table
 from pamrs.rig._reader import Reader
 from pamrs.rig._rig import (
     Parameter,

@@ -10,8 +10,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
+from pamrs.rig._joint import Joint
+from pamrs.rig._muscle import Muscle
 from pamrs.rig._ports import Ports
 from pamrs.rig._units import Units
 from pamrs.rig.schema import qualified, split_name, tables_of
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
     from pamrs.rig._muscle import Muscle
     from pamrs.rig._rig import Parameter
 
-Array = NDArray[np.float64]
 
 _PATHS = {"fill": ("fill",), "vent": ("vent",), "closed": (), "either": ("fill", "vent")}
 """Paths that are open in each position of a spool that switches."""
@@ -112,9 +113,6 @@ def _limitless(model: Mapping[str, Any], units: Units) -> list[str]:
 
 def _strokes(model: Mapping[str, Any], ports: Ports, units: Units) -> list[str]:
     """Muscles that are too long or too short for what their joint asks of them."""
-    from pamrs.rig._joint import Joint
-    from pamrs.rig._muscle import Muscle
-
     found = []
     joints, own_ways = tables_of(model, "joint"), tables_of(model, "transmission")
     for name, ends in ports["muscle"].items():
@@ -290,8 +288,6 @@ def _slack(model: Mapping[str, Any], ports: Ports, text: str, units: Units) -> l
     """Muscles that are slack without air because the file says nothing else, where their force
     model alone pushes back: a file of the time when they did may rely on it.
     """
-    from pamrs.rig._muscle import Muscle
-
     given = tomllib.loads(text).get("muscle", {})
     found: list[str] = []
     if (model["load"] or {}).get("kind") == "frame":
@@ -316,8 +312,6 @@ def _slack(model: Mapping[str, Any], ports: Ports, text: str, units: Units) -> l
 
 def _most_contracted(model: Mapping[str, Any], ports: Ports, name: str) -> float:
     """The largest contraction ratio that a joint or load leaves a muscle; 0 where nothing moves."""
-    from pamrs.rig._joint import Joint
-
     rest = float(tables_of(model, "muscle")[name]["rest_length"])
     if model["load"]:
         return 1.0 - float(model["load"]["min_length"]) / rest

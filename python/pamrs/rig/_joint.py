@@ -8,14 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, ArrayLike, Mask
 from pamrs._checks import as_numbers, doubt_pascals, finite, plain, quantities
 from pamrs.rig._muscle import Muscle
 from pamrs.rig.schema import SPRING, STOPS
-
-Array = NDArray[np.float64]
 
 
 class Joint:
@@ -155,7 +153,7 @@ class Joint:
         """
         return self._over(self._core.torque_arm, angle)
 
-    def reaches(self, angle: ArrayLike) -> NDArray[np.bool_]:
+    def reaches(self, angle: ArrayLike) -> Mask:
         """Whether the joint can have an angle.
 
         Parameters

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from pamrs._checks import checked_number, checked_table, doubt, one_of, plain, positive, refused
 from pamrs._files import read_toml
@@ -24,6 +24,7 @@ from pamrs._views import Panels, View
 from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError, RigError, joined, meant
 from pamrs.rig._cautions import cautions_of
+from pamrs.rig._muscle import Muscle
 from pamrs.rig._ports import Ports, connect, wiring
 from pamrs.rig._reader import Content, read_model
 from pamrs.rig._switching import (
@@ -38,9 +39,6 @@ from pamrs.rig._switching import (
 from pamrs.rig._units import Units
 from pamrs.rig._writer import core_json, toml_text
 from pamrs.rig.schema import BLOCKS, Key, keys_of, qualified, split_name, tables_of
-
-if TYPE_CHECKING:
-    from pamrs.rig._muscle import Muscle
 
 #: By the core, from the ports and from the tables when they are needed; what a rig differs from by
 #: numbers only, and what was made of it.
@@ -336,8 +334,6 @@ class Rig(View):
             raise ParameterError(
                 f"name = {name!r}: rig {self.name!r} has no such muscle; it has: {there}"
             )
-        from pamrs.rig._muscle import Muscle
-
         return Muscle.from_model(tables[name])
 
     def parameter(self, name: str) -> Parameter:

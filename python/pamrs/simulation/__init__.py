@@ -6,15 +6,12 @@ one rig side by side, :func:`replay` gives a rig the inputs of a
 recording.
 """
 
-from __future__ import annotations
-
 from pamrs.simulation._batch import Batch, BatchRun, Failure
 from pamrs.simulation._driving import (
     has_frame,
     initial_names,
-    input_names,
+    inputs_of,
     regulators_of,
-    switching_valves,
 )
 from pamrs.simulation._replay import differences, reading, replay
 from pamrs.simulation._side_by_side import REDUCTIONS, simulate_batch
@@ -43,10 +40,9 @@ __all__ = [
     "differences",
     "has_frame",
     "initial_names",
-    "input_names",
+    "inputs_of",
     "reading",
     "regulators_of",
-    "switching_valves",
     "replay",
     "simulate",
     "simulate_batch",

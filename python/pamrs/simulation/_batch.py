@@ -10,9 +10,9 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, ArrayLike, Mask
 from pamrs._checks import as_numbers, as_said, check_names, quantities, refused, whole
 from pamrs._tables import Columns, Tabular
 from pamrs._views import COLOURS, Panels, View, in_laboratory_units, over_time
@@ -30,7 +30,6 @@ from pamrs.simulation._simulation import (
     loop_samples,
 )
 
-Array = NDArray[np.float64]
 _MOST_DRAWN = 40  # plants of a batch
 #: What is made from the rest, and not pickled.
 _MADE = ("_core", "_first", "_inputs", "_channels", "_commands")
@@ -76,7 +75,7 @@ class BatchRun(View, Tabular, Mapping[str, Array]):
     reduced: dict[str, Array] = field(default_factory=dict)
 
     @property
-    def failed(self) -> NDArray[np.bool_]:
+    def failed(self) -> Mask:
         """Which plants ended, shape (n,)."""
         return np.array([failure is not None for failure in self.status], dtype=np.bool_)
 
@@ -261,7 +260,7 @@ class Batch:
         return self._core.samples * self.sample_time
 
     @property
-    def side_by_side(self) -> NDArray[np.bool_]:
+    def side_by_side(self) -> Mask:
         """Which plants run side by side in vector lanes, shape (n,); the others run one by one."""
         return np.array(self._core.side_by_side, dtype=np.bool_)
 

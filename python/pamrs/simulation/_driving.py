@@ -6,20 +6,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, by_hand, doubt_pascals, misshapen, one_of, refused
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.errors import ParameterError, meant
+from pamrs.rig import Rig
 from pamrs.simulation._plants import rowwise
 
-if TYPE_CHECKING:
-    from pamrs.rig import Rig
-
-Array = NDArray[np.float64]
 #: One array for a block without a name or the only one of its kind, else one for each name.
 Signals = ArrayLike | Mapping[str, ArrayLike]
 
@@ -217,23 +214,6 @@ def inputs_of(rig: Rig) -> Inputs:
     return inputs
 
 
-def input_names(rig: Rig) -> list[str]:
-    """Every signal that a rig takes.
-
-    Parameters
-    ----------
-    rig : Rig
-        The model.
-
-    Returns
-    -------
-    list of str
-        ``valve_command.elbow``, ``supply_command``, ``length``, ``pressure.flexor``: those that it
-        needs first.
-    """
-    return inputs_of(rig).names
-
-
 def initial_names(rig: Rig) -> list[str]:
     """Every state of a rig that an initial value can be given for.
 
@@ -342,11 +322,6 @@ def has_frame(rig: Rig) -> bool:
 def regulators_of(rig: Rig) -> list[str]:
     """Names of the supplies that are regulators."""
     return [name for name, table in rig.tables("supply").items() if table["kind"] == "regulator"]
-
-
-def switching_valves(rig: Rig) -> list[str]:
-    """Names of the valves that switch."""
-    return [name for name, table in rig.tables("valve").items() if table["spool"] == "switching"]
 
 
 def sensor_zero(rig: Rig, kind: str, key: str, block: str) -> float:

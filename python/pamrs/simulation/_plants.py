@@ -6,12 +6,11 @@ import os
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, as_said, misshapen, refused, whole
 from pamrs.errors import ParameterError
 
-Array = NDArray[np.float64]
 _MOST_THREADS = 256
 _MOST_PLANTS = 10_000_000
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.channels import channel_of, dotted, recorded_as
 from pamrs.errors import RecordingError
 from pamrs.simulation._driving import has_frame, regulators_of, sensor_zero
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from pamrs.recordings import Recording
     from pamrs.rig import Rig
 
-Array = NDArray[np.float64]
 
 #: State of a recording's first row that a simulation begins with, the block that has it and the
 #: zero of its sensor.

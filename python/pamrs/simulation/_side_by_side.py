@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, check_column, one_of, plain, quantities, refused, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
@@ -24,7 +24,6 @@ from pamrs.simulation._simulation import (
     rows_of,
 )
 
-Array = NDArray[np.float64]
 #: What a run can be reduced to.
 REDUCTIONS = ("final", "min", "max", "peak", "mean", "squared_error")
 #: Reduction and channel, and for the squared error a reference.

@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, ArrayLike, Mask
 from pamrs._checks import check_kind, doubt_pascals, positive, quantities, refused
 from pamrs._tables import Columns, Tabular
 from pamrs._tables import over_time as columns_over_time
@@ -27,8 +27,6 @@ from pamrs.simulation._driving import (
     sensor_zero,
     signals_of,
 )
-
-Array = NDArray[np.float64]
 
 
 class Event(NamedTuple):
@@ -226,7 +224,7 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         """What the recorded channels show to have happened."""
         return [told for told in (*self._clipped(), *self._pushed()) if told.times]
 
-    def _turns(self, of: NDArray[np.bool_]) -> list[float]:
+    def _turns(self, of: Mask) -> list[float]:
         """Times from which something holds and from which it no longer does, in turn [s]."""
         return [float(time) for time in self.time[np.flatnonzero(np.diff(of, prepend=False))]]
 

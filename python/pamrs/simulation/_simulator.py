@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, quantities
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
@@ -30,8 +30,6 @@ from pamrs.simulation._simulation import (
     core_rig,
     loop_samples,
 )
-
-Array = NDArray[np.float64]
 
 
 class Simulator:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import secrets
 import tempfile
@@ -12,6 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+from markupsafe import Markup
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
@@ -28,11 +31,15 @@ from starlette.responses import (
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from pamrs import rigs
+from pamrs._arrays import Array
 from pamrs._files import MOST_BYTES, MOST_TOML_BYTES
 from pamrs._progress import duration_words
+from pamrs._views import decimate
+from pamrs.channels import laboratory_unit
 from pamrs.errors import PamrsError, ParameterError
-from pamrs.studio._folder import Studio
-from pamrs.studio._page import page
+from pamrs.report.page import render_page
+from pamrs.studio._folder import Studio, Table
 from pamrs.studio._run import FILES
 
 _OWN: Final = (
@@ -236,3 +243,118 @@ def make_app(studio: Studio, token: str) -> ASGIApp:
         *(Route(f"/{what}", partial(act, what), methods=["POST"]) for what in acts),
     ]
     return _Guard(Starlette(routes=routes), token)
+
+
+_TEMPLATE: Final = Path(__file__).with_name("page.html.j2")
+_UNITS: Final = "bar bar(a) mbar kPa kPa(a) MPa Pa psi deg rad mm m V mV mA N kN kg K degC 1 %"
+
+
+def page(studio: Studio, token: str) -> str:
+    """The page as HTML.
+
+    Parameters
+    ----------
+    studio : Studio
+        The case folder.
+    token : str
+        What its script sends back with each press of a button.
+
+    Returns
+    -------
+    str
+    """
+    rig, rig_error = studio.rig()
+    tables, data_error = studio.tables()
+    found, result_error = studio.result()
+    return render_page(
+        _TEMPLATE,
+        token=token,
+        folder=str(studio.folder),
+        rig=rig,
+        rig_error=rig_error,
+        rig_text=studio.text("rig.toml"),
+        most_bytes=MOST_BYTES,
+        case_text=studio.text("case.toml"),
+        foreign=studio.foreign,
+        packaged=rigs.names(),
+        logs=[_log(table) for table in tables],
+        data_error=data_error,
+        channels={name: laboratory_unit(name)[0] or "1" for name in studio.channels()},
+        units=_UNITS.split(),
+        check=studio.checked,
+        green=studio.green,
+        running=studio.run is not None and studio.run.running,
+        run_error=studio.said_of_run(),
+        found=found,
+        result_error=result_error,
+        stale=found is not None and studio.stale(found),
+        has_experiment=studio.result_file("experiment.csv") is not None,
+    )
+
+
+def _log(table: Table) -> dict[str, Any]:
+    """A log: its columns with curves, what is proposed, what to look at."""
+    item, first = table.item, table.entries[0]
+    rows = []
+    for each in item.listed:
+        channel, entry = table.channel(each.name)
+        series = item.log.series[each.name]
+        clock = series.stamps or each.name == item.time.get("column")
+        rows.append(
+            {
+                "name": each.name,
+                "curve": sparkline(np.asarray(series.values, dtype=float)),
+                "low": f"{each.low:.5g}" if math.isfinite(each.low) else "–",
+                "high": f"{each.high:.5g}" if math.isfinite(each.high) else "–",
+                "rate": f"{each.rate:.4g} Hz" if math.isfinite(each.rate) else "–",
+                "clock": clock,
+                "channel": channel,
+                "unit": entry.get("unit", each.unit),
+                "calibrated": "from" in entry,
+                "assumed": entry.get("assumed", ""),
+            }
+        )
+    return {
+        "file": first["file"],
+        "name": first.get("name", ""),
+        "role": table.role,
+        "roles": table.roles,
+        "clockless": "sample_time" in first
+        or any(row["channel"] and row["rate"] == "–" for row in rows),
+        "spacing": f"{first['sample_time']:g} s" if "sample_time" in first else "",
+        "rows": rows,
+        "remarks": [*item.log.remarks, *item.remarks],
+        "unread": item.log.unread,
+    }
+
+
+_WIDTH: Final = 240
+_HEIGHT: Final = 36
+
+
+def sparkline(values: Array) -> Markup:
+    """A curve over the samples, from the smallest to the largest value of each stretch.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Numbers; what is not finite is left out.
+
+    Returns
+    -------
+    Markup
+        An ``svg`` element; empty where no number is.
+    """
+    rows = np.flatnonzero(np.isfinite(values))
+    if not rows.size:
+        return Markup("")
+    ends, drawn = decimate(rows, values[rows], 2 * _WIDTH)
+    low, high = float(drawn.min()), float(drawn.max())
+    scale = (_HEIGHT - 4) / (high - low) if high > low else 0.0
+    x = ends * (_WIDTH / max(1, values.size - 1))
+    y = _HEIGHT - 2 - (drawn - low) * scale if scale else np.full(x.size, _HEIGHT / 2)
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+    return Markup(
+        '<svg class="spark" viewBox="0 0 {} {}" preserveAspectRatio="none" aria-hidden="true">'
+        '<polyline points="{}"/></svg>'
+    ).format(_WIDTH, _HEIGHT, points)

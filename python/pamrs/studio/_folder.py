@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,14 +15,15 @@ from pamrs import rigs
 from pamrs._checks import refused
 from pamrs._files import MOST_NAME, found_outside, is_inside, parse_toml, read_toml, resolved, shown
 from pamrs._writing import write_atomically
-from pamrs.diagnosis import Diagnosis
+from pamrs.channels import channel_of
+from pamrs.diagnosis import Diagnosis, DiagnosisSettings
+from pamrs.diagnosis.ready import readied
 from pamrs.diagnosis.result import load_result
 from pamrs.errors import CaseError, PamrsError, ParameterError
-from pamrs.recordings import LogProposal, Proposal, channels_of, load_case, propose
+from pamrs.recordings import Case, LogProposal, Proposal, channels_of, load_case, propose
 from pamrs.recordings.logs import check_readable
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig
-from pamrs.studio._check import Check, checked
 from pamrs.studio._run import RESULT, Run
 from pamrs.units import to_si
 
@@ -467,3 +468,55 @@ def _chosen(table: Table, columns: Mapping[str, Any]) -> dict[str, Any]:
             clock = {"time": entry.get("time", clocks[0])} if clocks else {}
             made[channel] = {"column": column, "unit": unit} | clock
     return made
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a check of the case found.
+
+    Attributes
+    ----------
+    error : str
+        Why the case cannot be diagnosed; empty where it can.
+    cautions : list of str
+        What was found and masked, or is to be looked at.
+    inputs : dict of str to str
+        SHA-256 of each file that was read.
+    """
+
+    error: str
+    cautions: list[str] = field(default_factory=list)
+    inputs: dict[str, str] = field(default_factory=dict)
+
+
+def checked(case: Case) -> Check:
+    """Look at a case as a diagnosis does before it fits anything.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+
+    Returns
+    -------
+    Check
+
+    Raises
+    ------
+    DiagnosisError
+        If units or columns cannot be right, or no block of the rig can be judged.
+    """
+    ready = readied(case, DiagnosisSettings())
+    cautions = [*case.rig.cautions, *ready.suspected, *_issues(case)]
+    return Check("", list(dict.fromkeys(cautions)), dict(case.inputs))
+
+
+def _issues(case: Case) -> list[str]:
+    """What was found in the recordings, each kind of it once."""
+    found: dict[str, int] = {}
+    for recording in case.recordings:
+        for issue in recording.issues:
+            where = "" if issue.kind == "log" else f"{channel_of(issue.channel)}: "
+            text = f"{recording.name}: {where}{issue.text}"
+            found[text] = found.get(text, 0) + 1
+    return [f"{text} ({count} times)" if count > 1 else text for text, count in found.items()]

@@ -4,8 +4,6 @@
 :func:`gain_map` closes a controller around every run. :func:`open_sweep` reads a result again.
 """
 
-from __future__ import annotations
-
 from pamrs.sweeps._loops import gain_map
 from pamrs.sweeps._store import open_sweep
 from pamrs.sweeps._sweep import sweep

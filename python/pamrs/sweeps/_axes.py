@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_column, as_numbers, check_column, refused
 from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, meant
 from pamrs.rig import Rig
 
-Array = NDArray[np.float64]
 #: How the name of an initial value begins: ``initial.joint_angle``.
 INITIAL: Final = "initial."
 

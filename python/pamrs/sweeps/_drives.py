@@ -12,8 +12,8 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._checks import one_of, refused
 from pamrs.channels import dotted, unit_of
 from pamrs.errors import PamrsError, ParameterError, RigError
@@ -21,8 +21,6 @@ from pamrs.rig import Rig, parse_rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import REDUCTIONS, core_rig, simulate_batch
 from pamrs.sweeps._axes import INITIAL, Quantity, digest, quantity
-
-Array = NDArray[np.float64]
 
 
 class Metric(NamedTuple):

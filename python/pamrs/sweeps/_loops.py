@@ -9,9 +9,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from pamrs import control
+from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import check_kind, refused
 from pamrs.control.trajectories import Trajectory
 from pamrs.errors import ParameterError
@@ -24,7 +24,6 @@ from pamrs.sweeps._sweep import run_plan
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 #: How the name of a gain begins: ``gain.kp``.
 GAIN: Final = "gain."
 _NO_RIG: Final = (GAIN, INITIAL)

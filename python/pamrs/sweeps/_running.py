@@ -1,16 +1,20 @@
-"""Chunks through an executor: a bounded number in flight, each kept as soon as it is done."""
+"""Chunks through an executor: a bounded number in flight, each kept as soon as it is done and told
+as progress.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import sys
+import time
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from itertools import islice
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
+from pamrs._progress import LOG, Line, duration_words
 from pamrs.errors import PamrsError, ParameterError, SimulationError
 from pamrs.sweeps._drives import Done, Task, run_chunk
-from pamrs.sweeps._progress import Progress
 from pamrs.sweeps._store import Store
 
 #: Chunks in flight for each worker: one is worked out, one waits.
@@ -81,15 +85,11 @@ def run_missing(
         If the executor lost its workers. What is done is kept.
     """
     tasks = ((chunk, store.plan.task(chunk, threads)) for chunk in store.missing())
-    done = _here(tasks) if executor is None else _there(tasks, executor, most)
+    here = ((chunk, task, run_chunk(task)) for chunk, task in tasks)
+    done = here if executor is None else _there(tasks, executor, most)
     for chunk, task, result in done:
         entry = store.write(chunk, task.values, result)
         progress.add(entry.runs, entry.ended)
-
-
-def _here(tasks: Iterator[tuple[int, Task]]) -> Iterator[tuple[int, Task, Done]]:
-    for chunk, task in tasks:
-        yield chunk, task, run_chunk(task)
 
 
 def _there(
@@ -121,3 +121,92 @@ def _there(
     finally:
         for future in flying:
             future.cancel()
+
+
+#: Seconds from one line to the next, on a terminal and elsewhere.
+_TERMINAL, _FILE = 0.5, 10.0
+
+
+class Progress:
+    """Lines about a sweep on stderr.
+
+    Parameters
+    ----------
+    name : str
+        Of the store.
+    runs, done, ended : int
+        Runs in all, those done before, and how many of these ended.
+    chunks, chunks_done : int
+    shown : bool or callable
+        Whether anything is written; what is called with each line instead.
+    stream : text stream, optional
+        By default stderr.
+    clock : callable
+        Gives a time [s].
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        runs: int,
+        chunks: int,
+        done: int = 0,
+        ended: int = 0,
+        chunks_done: int = 0,
+        shown: bool | Callable[[str], object] = True,
+        stream: TextIO | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._name, self._runs, self._chunks = name, runs, chunks
+        self._before, self._done, self._ended = done, done, ended
+        self._chunks_done = chunks_done
+        self._to = shown if callable(shown) else None
+        self._stream = (stream or sys.stderr) if shown and self._to is None else None
+        self._clock, self._began = clock, clock()
+        terminal = self._stream is not None and self._stream.isatty()
+        self._every: Final = _TERMINAL if terminal else _FILE
+        self._end: Final = "\r" if terminal else "\n"
+        self._said = self._began
+        if done:
+            self._write(f"{self.line()}, going on", last=True)
+
+    def add(self, runs: int, ended: int) -> None:
+        """A chunk more is done."""
+        self._done += runs
+        self._ended += ended
+        self._chunks_done += 1
+        now = self._clock()
+        last = self._done == self._runs
+        if last or now - self._said >= self._every:
+            self._said = now
+            self._write(self.line(), last=last)
+
+    def line(self) -> str:
+        """How far it is, in one line."""
+        ended = f" ({self._ended} ended before their end)" if self._ended else ""
+        said = (
+            f"sweep {self._name}: {self._chunks_done} of {self._chunks} chunks, "
+            f"{self._done} of {self._runs} runs{ended}"
+        )
+        passed, left = self._clock() - self._began, self._left()
+        if left is None:
+            return said
+        said += f", {(self._done - self._before) / passed:.4g} runs/s"
+        if self._done == self._runs:
+            return f"{said}, took {duration_words(passed)}"
+        return f"{said}, {duration_words(left)} left"
+
+    def _left(self) -> float | None:
+        """How long it will go on [s]; None where nothing is done yet."""
+        passed, new = self._clock() - self._began, self._done - self._before
+        return passed * (self._runs - self._done) / new if new and passed > 0.0 else None
+
+    def _write(self, line: str, *, last: bool) -> None:
+        LOG.info("%s", line)
+        if self._to is not None:
+            self._to(Line(line, self._done / self._runs, self._left()))
+        if self._stream is not None:
+            end = "\n" if last else self._end
+            self._stream.write(f"{line:<100}{end}" if self._end == "\r" else f"{line}{end}")
+            self._stream.flush()

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError, joined, missing_package
 from pamrs.sweeps._plan import Plan, differences
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from pamrs.rig import Rig
     from pamrs.sweeps._drives import Done
 
-Array = NDArray[np.float64]
 #: The array that says when a run ended [s]; NaN where it reached the end.
 ENDED_AT: Final = "ended_at"
 _FOLDER, _PLAN, _JOURNAL, _LOCK = ".pamrs", "plan.json", "journal", "lock"

@@ -15,8 +15,7 @@ from pamrs.rig import Rig, check_sample_time
 from pamrs.sweeps._axes import INITIAL, Axes
 from pamrs.sweeps._drives import Drive, OpenLoop, metric_of, run_chunk
 from pamrs.sweeps._plan import Plan
-from pamrs.sweeps._progress import Progress
-from pamrs.sweeps._running import executor_of, in_flight_of, run_missing
+from pamrs.sweeps._running import Progress, executor_of, in_flight_of, run_missing
 from pamrs.sweeps._store import ENDED_AT, Store, open_sweep
 
 if TYPE_CHECKING:

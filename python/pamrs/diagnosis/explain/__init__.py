@@ -3,8 +3,6 @@
 Public: `assemble`, `data_used`, `forms_of` (what has no name), `misread_diagnosis` (units first).
 """
 
-from __future__ import annotations
-
 from pamrs.diagnosis.explain._assemble import assemble
 from pamrs.diagnosis.explain._data_used import data_used
 from pamrs.diagnosis.explain._forms import forms_of

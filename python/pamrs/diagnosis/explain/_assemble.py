@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
@@ -21,7 +20,7 @@ from pamrs.diagnosis.evidence import (
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.explain._block_entries import block_entries, not_judged, unexplained
 from pamrs.diagnosis.explain._conditions import Picture, describe
-from pamrs.diagnosis.explain._forms import forms_of
+from pamrs.diagnosis.explain._forms import form_sentence, forms_of
 from pamrs.diagnosis.fit import (
     CHOSEN,
     Problem,
@@ -59,7 +58,6 @@ from pamrs.findings import (
     WrongParameter,
 )
 from pamrs.recordings import Case
-from pamrs.report.forms import form_sentence
 from pamrs.report.verdict import unknown_volumes
 from pamrs.report.verdict import verdict as verdict_in_words
 from pamrs.rig import Rig
@@ -70,9 +68,6 @@ _LEAST_GAP = 0.05
 _DETERMINED_SHARE = 0.7
 # [standard deviations] moved, from which a parameter counts as determined too
 _DETERMINED_MOVE = 2.0
-
-
-Array = NDArray[np.float64]
 
 
 def assemble(

@@ -11,7 +11,7 @@ from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, parameters_at_wall, significant
 from pamrs.diagnosis.explain._conditions import describe
 from pamrs.diagnosis.explain._words import TELLING_CONDITION
-from pamrs.diagnosis.fit import Key, Problem, concerns, depends
+from pamrs.diagnosis.fit import Key, Problem, Stages, concerns, depends
 from pamrs.diagnosis.noise import NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual, Unjudged
 from pamrs.findings import (
@@ -27,8 +27,6 @@ from pamrs.findings import (
     left_of,
 )
 from pamrs.rig import Rig
-
-Stages = dict[str, dict[Key, Residual]]
 
 
 def block_entries(

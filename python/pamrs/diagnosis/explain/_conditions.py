@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Mask
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.fit import Key
 from pamrs.diagnosis.noise import NoiseLevel, bins_of
@@ -18,8 +18,6 @@ from pamrs.diagnosis.prepare import Block, Prepared, binned
 from pamrs.findings import Condition
 from pamrs.rig import Rig
 from pamrs.units import with_unit
-
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -41,7 +39,7 @@ class Picture:
     recording: str = ""
 
 
-def _binned(values: Array, rows: NDArray[np.bool_], width: int) -> Array:
+def _binned(values: Array, rows: Mask, width: int) -> Array:
     return binned(values, rows, width)[0]
 
 
@@ -85,9 +83,9 @@ def _conditions(block: Block, prepared: Prepared, rig: Rig, width: int) -> dict[
     return out
 
 
-def _regimes(c: dict[str, Array]) -> dict[str, NDArray[np.bool_]]:
+def _regimes(c: dict[str, Array]) -> dict[str, Mask]:
     """Named yes/no conditions of each bin."""
-    out: dict[str, NDArray[np.bool_]] = {}
+    out: dict[str, Mask] = {}
     for name, values in c.items():
         quantity, _, _ = name.partition(" [")
         of = " of" + quantity.partition(" of")[2] if " of " in quantity else ""
@@ -182,7 +180,7 @@ def describe(
     return picture
 
 
-def _shares(regimes: dict[str, NDArray[np.bool_]], z: Array, *, rising: bool) -> list[Condition]:
+def _shares(regimes: dict[str, Mask], z: Array, *, rising: bool) -> list[Condition]:
     """What of the excess each condition carries that none before it has, the most telling first: no
     bin is counted twice, so that shares add up to at most all of it.
     """
@@ -194,7 +192,7 @@ def _shares(regimes: dict[str, NDArray[np.bool_]], z: Array, *, rising: bool) ->
         if not waiting:
             break
 
-        def telling(mask: NDArray[np.bool_]) -> float:
+        def telling(mask: Mask) -> float:
             return float(np.sum(excess[mask])) ** 2 / max(0.02, float(mask.mean()))
 
         name = max(waiting, key=lambda name: telling(waiting[name]))
@@ -227,7 +225,7 @@ def _sign(z: Array, *, rising: bool) -> str:
     return f", where the measurement {both} the model"
 
 
-def _change(values: Array, rows: NDArray[np.bool_], width: int) -> Array:
+def _change(values: Array, rows: Mask, width: int) -> Array:
     means, counts = binned(values, rows, width)
     change = np.zeros_like(means)
     change[1:] = np.where((counts[1:] > 0) & (counts[:-1] > 0), means[1:] - means[:-1], 0.0)
@@ -235,7 +233,7 @@ def _change(values: Array, rows: NDArray[np.bool_], width: int) -> Array:
     return np.where(np.abs(change) > limit, 0.0, change)
 
 
-def _intervals(flags: NDArray[np.bool_], bin_time: float, most: int = 12) -> list[list[float]]:
+def _intervals(flags: Mask, bin_time: float, most: int = 12) -> list[list[float]]:
     # bridge single bins, keep the longest stretches
     bridged = flags.copy()
     bridged[1:-1] |= flags[:-2] & flags[2:]

@@ -3,7 +3,7 @@ from several starts.
 
 Public: `Problem`, `Fit`, `Scaling`, `Weights`,
 `Unfollowed`, `fit`, `residuals`, `changes`, `stacked`,
-`with_priors`, `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`;
+`with_priors`, `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`, `Residuals`, `Stages`;
 `levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where the fit of an effect begins);
 `form_in`, `entry_of`, `with_effects_of`, `with_entry`, `without_term` (effects of a rig
 and their forms);
@@ -14,8 +14,6 @@ is known of all parameters); `ends_in_tolerances`,
 `moved_value` (how far they may move); `spread_over_pieces`
 (standard deviations of coloured residuals).
 """
-
-from __future__ import annotations
 
 from pamrs.diagnosis.fit._acting import (
     acts_in,
@@ -33,7 +31,9 @@ from pamrs.diagnosis.fit._fitting import (
     Fit,
     Key,
     Problem,
+    Residuals,
     Scaling,
+    Stages,
     Unfollowed,
     Weights,
     bin_width,
@@ -47,8 +47,10 @@ from pamrs.diagnosis.fit._fitting import (
     with_priors,
 )
 from pamrs.diagnosis.fit._held import (
+    ends_in_tolerances,
     holdable,
     known_parameters,
+    moved_value,
     with_known,
     without_passing,
 )
@@ -65,7 +67,6 @@ from pamrs.diagnosis.fit._starts import (
     with_entry,
     without_term,
 )
-from pamrs.diagnosis.fit._tolerances import ends_in_tolerances, moved_value
 from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
 
 __all__ = [
@@ -77,6 +78,8 @@ __all__ = [
     "Events",
     "Fit",
     "Key",
+    "Residuals",
+    "Stages",
     "Problem",
     "Scaling",
     "Start",

@@ -13,20 +13,21 @@ from threading import Event
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array
 from pamrs._losses import Losses
 from pamrs.diagnosis.fit._acting import acts_in, core_names, depends
-from pamrs.diagnosis.fit._held import known_parameters, with_known
-from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
-from pamrs.diagnosis.fit._starts import without_term
-from pamrs.diagnosis.fit._tolerances import (
+from pamrs.diagnosis.fit._held import (
     ends_in_tolerances,
     in_tolerances,
+    known_parameters,
     moved_slope,
     moved_value,
+    with_known,
 )
+from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.fit._starts import without_term
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS, Hypothesis, Term, effect_of, find_parameter, usual_values
@@ -49,10 +50,11 @@ _LAST_STEPS = 2  # of which one left the range, where a fit was stopped there: i
 FIT_BIN_TIME = 0.02  # [s] bins of residuals for fits: faster than any effect of the catalogue shows
 
 
-Array = NDArray[np.float64]
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 Key = tuple[str, str]
+Residuals = dict[Key, Residual]
+Stages = dict[str, Residuals]
 """Block and recording."""
 
 LOGARITHMIC = frozenset(
@@ -212,7 +214,7 @@ class Fit:
     std: dict[str, float]
     covariance: Array
     cost: float
-    residuals: dict[Key, Residual]
+    residuals: Residuals
     moved: dict[str, float] = field(default_factory=dict)
     evaluations: int = 0
     scales: dict[str, float] = field(default_factory=dict)
@@ -251,7 +253,7 @@ class Fit:
 
 def residuals(
     problem: Problem, rig: Rig, names: Sequence[str] = (), events: Events | None = None
-) -> dict[Key, Residual]:
+) -> Residuals:
     """Residuals of a model for every block and recording; jacobians for the names that a block
     depends on. What the core has no sensitivities to, the shape of a muscle or of its tendon, is
     shifted by a share of its tolerance.
@@ -334,9 +336,7 @@ def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> l
         return list(pool.map(function, items))
 
 
-def _everywhere(
-    problem: Problem, one: Callable[[Block, Prepared], Residual]
-) -> dict[Key, Residual]:
+def _everywhere(problem: Problem, one: Callable[[Block, Prepared], Residual]) -> Residuals:
     """What a function gives for every block and recording, two at a time.
 
     The longest come first, so that no processor is left alone with one of them at the end.
@@ -467,7 +467,7 @@ def bin_width(prepared: Prepared, seconds: float) -> int:
 
 
 def stacked(
-    problem: Problem, found: dict[Key, Residual], inflation: dict[str, float]
+    problem: Problem, found: Residuals, inflation: dict[str, float]
 ) -> tuple[Array, Array | None]:
     """Residuals of all blocks and recordings as one vector of bin means in units of their standard
     deviation.
@@ -503,7 +503,7 @@ def stacked(
     return np.concatenate(rows), np.concatenate(slopes) if slopes else None
 
 
-def predicted_with_doubt(problem: Problem, found: Fit) -> dict[Key, Residual]:
+def predicted_with_doubt(problem: Problem, found: Fit) -> Residuals:
     """Residuals of recordings that were not fitted, as far as what the fit leaves open of its
     parameters cannot bring them.
 
@@ -555,10 +555,10 @@ def with_priors(problem: Problem, found: Fit, inflation: dict[str, float]) -> fl
 def changes(
     problem: Problem,
     rig: Rig,
-    base: dict[Key, Residual],
+    base: Residuals,
     effect: Term,
     known: Mapping[Key, Residual] | None = None,
-) -> dict[Key, Residual]:
+) -> Residuals:
     """Residuals of a model near to another whose residuals (with the starts of their windows) are
     known; values alone.
 
@@ -667,7 +667,7 @@ def fit(
 
     refused: list[SimulationError | None] = []
 
-    def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
+    def evaluate(x: Array) -> tuple[Array, Array, Residuals]:
         try:
             found = residuals(problem, scaling.rig(x, fixed or {}), scaling.names, events)
         except SimulationError as error:

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.errors import SimulationError
 
 # [chi-square] predicted gain of a step below which a fit ends: noise makes as much (decision 14)
@@ -27,7 +27,6 @@ _MOST_DAMPING = 1e8  # damping at which they give up
 _MOST_SQUARES = 1e200  # sum of squares of rows and sensitivities that any damping leaves finite
 
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 

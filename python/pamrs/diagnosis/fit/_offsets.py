@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Index
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit._fitting import Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.fit._held import known_parameters
@@ -39,8 +39,7 @@ _MOST_OFFSET = 1.0
 _MOST_OFFSETS = 40
 
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
+Rows = Index
 
 
 class _Change(NamedTuple):

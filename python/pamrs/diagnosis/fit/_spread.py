@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm, t
 
+from pamrs._arrays import Array, Index
 from pamrs.diagnosis.fit._fitting import FIT_BIN_TIME, Fit, Key, Problem, bin_width, stacked
 from pamrs.diagnosis.prepare import Residual
 
 # [s] pieces that count as looks: longer than wrong residuals stay alike; arm windows are 2.5 s
 PIECE_TIME = 5.0
-
-
-Array = NDArray[np.float64]
 
 
 def spread_over_pieces(problem: Problem, found: Fit) -> dict[str, float]:
@@ -48,9 +45,7 @@ def spread_over_pieces(problem: Problem, found: Fit) -> dict[str, float]:
     return found.std | dict(zip(names, np.maximum(own, wide).tolist(), strict=True))
 
 
-def pieces_spread(
-    rows: Array, jacobian: Array, covariance: Array, pieces: list[NDArray[np.intp]]
-) -> Array:
+def pieces_spread(rows: Array, jacobian: Array, covariance: Array, pieces: list[Index]) -> Array:
     """Standard deviations by how much pieces of the residuals pull the parameters apart.
 
     Parameters
@@ -88,13 +83,13 @@ def _pull(root: Array, jacobian: Array, rows: Array) -> Array:
     return pull
 
 
-def pieces_of(problem: Problem, found: dict[Key, Residual]) -> list[NDArray[np.intp]]:
+def pieces_of(problem: Problem, found: dict[Key, Residual]) -> list[Index]:
     """Rows of the stacked residuals in each piece of a recording, all blocks together."""
     count = 0
-    pieces: list[NDArray[np.intp]] = []
+    pieces: list[Index] = []
     for prepared in problem.recordings:
         width = bin_width(prepared, FIT_BIN_TIME)
-        own: dict[int, list[NDArray[np.intp]]] = {}
+        own: dict[int, list[Index]] = {}
         for block in problem.blocks:
             rows = found[block.name, prepared.recording.name].rows
             bins = np.arange(rows.size // width)

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from threading import Event
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.diagnosis.fit._fitting import (
     Events,
     Fit,
@@ -59,9 +59,6 @@ _MOST_RISE = 2.0  # [s] longest edge of an event (a hand)
 _MOST_EVENT_SIZE = 1e3  # [SI] largest size of an event that a fit may reach
 _EVALUATIONS_ALONE = 8  # evaluations of the fit of one recording's events at the most
 _EVALUATIONS_TOGETHER = 12  # evaluations of the fit of baseline and events of all recordings
-
-
-Array = NDArray[np.float64]
 
 
 def events_of(effect: Term, form: str = "") -> list[list[EffectParameter]]:

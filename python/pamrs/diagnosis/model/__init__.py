@@ -5,11 +5,9 @@ Public: `conclude`, `Conclusion`, `Models`, `with_std`, `spoiled_channels`, `own
 `owners_of_parameters` (whose value the model has), `said_of_constants` (free runs).
 """
 
-from __future__ import annotations
-
+from pamrs.diagnosis.model._budget import owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.model._conclude import Conclusion, Models, conclude, spoiled_channels, with_std
 from pamrs.diagnosis.model._free_run import said_of_constants
-from pamrs.diagnosis.model._owners import owners_of_effects, owners_of_parameters
 
 __all__ = [
     "Conclusion",

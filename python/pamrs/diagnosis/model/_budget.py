@@ -10,14 +10,16 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.channels import unit_of
-from pamrs.diagnosis.evidence import Judged, significant
+from pamrs.diagnosis.evidence import Candidate, Judged, significant
 from pamrs.diagnosis.fit import (
     Events,
     Key,
     Problem,
+    Residuals,
+    Stages,
     acts_in,
     concerns,
     form_in,
@@ -26,7 +28,6 @@ from pamrs.diagnosis.fit import (
     with_known,
     without_term,
 )
-from pamrs.diagnosis.model._owners import owners_of_effects
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -38,10 +39,6 @@ from pamrs.rig import Parameter, Rig
 # weightings of pieces for a share's interval: ten of them lie beyond each 95 % end
 _BUDGET_DRAWS = 400
 
-
-Array = NDArray[np.float64]
-Stages = dict[str, dict[Key, Residual]]
-Residuals = dict[Key, Residual]
 
 _NAMED = ("wrong_parameter", "effect")
 """Kinds of terms that a name stands for."""
@@ -368,3 +365,51 @@ class _Shares:
         shares = taken / self._whole
         low, high = np.quantile(shares[1:], [0.025, 0.975])
         return float(shares[0]), [float(low), float(high)]
+
+
+def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
+    """The group that tells most of each parameter that several have (sensors' zeros): the one with
+    the least standard deviation.
+
+    What a group leaves without a name is in its autocorrelation, and so in its standard deviations.
+    Events are fitted with the values beside them, which stay.
+    """
+
+    def spread(k: int, name: str) -> float:
+        own = candidates[k].fit
+        return own.std.get(name, math.inf) if own.events is None else 0.0
+
+    found: dict[str, int] = {}
+    for k, candidate in enumerate(candidates):
+        for name in candidate.fit.moved:
+            if spread(k, name) <= spread(found.get(name, k), name):
+                found[name] = k
+    return found
+
+
+def owners_of_effects(candidates: list[Candidate]) -> dict[Term, int]:
+    """The group that tells most of each effect that several have (a clock moves what arm and
+    chamber see): the one whose standard deviations are least, on the average of their logarithms.
+    """
+    found: dict[Term, int] = {}
+    for k, candidate in enumerate(candidates):
+        for effect in candidate.effects:
+            last = candidates[found.get(effect, k)]
+            if _doubt(candidate, effect) <= _doubt(last, effect):
+                found[effect] = k
+    return found
+
+
+def _doubt(candidate: Candidate, effect: Term) -> float:
+    """How little a fit tells of an effect: mean logarithm of the standard deviations of its
+    parameters, in units of their typical sizes.
+    """
+    std = candidate.fit.std
+    logs = []
+    for name in candidate.fit.values:
+        if effect_of(name) == effect:
+            parameter = find_parameter(name)
+            size = max(abs(s) for s in (parameter.default, *parameter.starts))
+            spread = std[name] / size if size > 0.0 else std[name]
+            logs.append(math.log(spread) if spread > 0.0 else math.inf)
+    return sum(logs) / len(logs) if logs else -math.inf

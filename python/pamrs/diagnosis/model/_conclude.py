@@ -12,9 +12,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from pamrs._arrays import Array
 from pamrs.diagnosis.evidence import (
     BlockGroup,
     Candidate,
@@ -45,9 +45,8 @@ from pamrs.diagnosis.fit import (
     with_known,
     without_term,
 )
-from pamrs.diagnosis.model._budget import budget
+from pamrs.diagnosis.model._budget import budget, owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.model._free_run import KnownValues, free_run
-from pamrs.diagnosis.model._owners import owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -68,9 +67,6 @@ from pamrs.rig import Rig
 # [tolerances] of two groups about one sensor's zero that refits the vaguer (decision 22)
 _ZERO_DIFFERENCE = 0.1
 _SPOILED = 1.2  # error of a channel over that of the model before, from which it is reported
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

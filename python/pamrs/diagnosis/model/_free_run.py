@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2
 
+from pamrs._arrays import Array
 from pamrs.channels import channel_of, dotted, recorded_as, unit_of
-from pamrs.diagnosis.fit import Events, Key, Problem, with_known
+from pamrs.diagnosis.fit import Events, Key, Problem, Stages, with_known
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Block, Prepared, Residual
 from pamrs.effects import EFFECTS, ports_of
@@ -43,9 +43,6 @@ _OFF_SAMPLES = 200_000
 _OFF_STEPS = 2
 
 
-Array = NDArray[np.float64]
-
-
 @dataclass(frozen=True, eq=False)
 class KnownValues:
     """What is known of the values of a rig.
@@ -70,8 +67,6 @@ _FREED = ("muscle_force", "joint_torque", "temperature")
 
 _COMMANDS = ("valve_command", "supply_command", "pressure_command")
 """Channels that drive a free run."""
-
-Stages = dict[str, dict[Key, Residual]]
 
 
 def free_run(

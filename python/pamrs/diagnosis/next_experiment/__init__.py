@@ -5,8 +5,6 @@ Public: `next_to_record` (what a diagnosis asks for), `propose` (experiments com
 :mod:`pamrs.experiments`.
 """
 
-from __future__ import annotations
-
 from pamrs.diagnosis.next_experiment._asked import next_to_record
 from pamrs.diagnosis.next_experiment._choice import propose
 from pamrs.diagnosis.next_experiment._differences import measurable

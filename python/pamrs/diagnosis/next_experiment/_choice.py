@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._losses import Losses
 from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, acts_in, bin_width, two_at_a_time
@@ -57,7 +57,6 @@ _MOST_SHOWN = 5  # experiments in the ranking
 _HOPELESS_SHARE = 0.1  # share of the uncertainty below which the text suggests another sensor
 
 
-Array = NDArray[np.float64]
 Modelled = tuple[str, Rig, float]
 """A hypothesis with a model: its text, the rig and its probability."""
 

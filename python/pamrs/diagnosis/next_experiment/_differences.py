@@ -15,9 +15,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pamrs._arrays import solve_normal
+from pamrs._arrays import Array, solve_normal
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, bin_width, free_baseline, residuals
 from pamrs.diagnosis.noise import bins_of, noise_levels
@@ -48,8 +47,6 @@ _LENGTH_NOISE = 3e-5  # [m] of a length: usual linear transducer
 _TEMPERATURE_NOISE = 0.1  # [K] of a gas's temperature: usual thermocouple amplifier
 _FORCE_NOISE = 1.0  # [N] of a force: usual load cell of 2 to 5 kN, 0.02 to 0.05 % of its range
 
-
-Array = NDArray[np.float64]
 
 COMMANDS = ("valve_command", "supply_command")
 """Channels that a person sends."""

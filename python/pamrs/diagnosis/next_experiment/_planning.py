@@ -19,9 +19,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pamrs._arrays import solve_normal
+from pamrs._arrays import Array, solve_normal
 from pamrs._progress import Steps
 from pamrs.diagnosis.fit import (
     FIT_BIN_TIME,
@@ -69,8 +68,6 @@ _MOST_MULTIPLE = 1e4  # [typical sizes] largest size of an effect that is worth 
 # halvings of a size until a rig can have it: below a hundredth it is another effect
 _MOST_HALVINGS = 8
 
-
-Array = NDArray[np.float64]
 
 BASIC = (
     "multisine",

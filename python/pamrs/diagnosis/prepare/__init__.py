@@ -17,8 +17,6 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 that do not push back).
 """
 
-from __future__ import annotations
-
 from pamrs.diagnosis.prepare._ambient import AMBIENT, AMBIENT_PRESSURE, at_ambient
 from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
 from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings, said_of_warm_starts
@@ -43,7 +41,7 @@ from pamrs.diagnosis.prepare._plausible import (
     without_dead_commands,
     without_impossible,
 )
-from pamrs.diagnosis.prepare._rails import without_rails
+from pamrs.diagnosis.prepare._rails import without_poor_thermometers, without_rails
 from pamrs.diagnosis.prepare._signals import (
     Prepared,
     binned,
@@ -56,7 +54,6 @@ from pamrs.diagnosis.prepare._signals import (
     warm_chambers,
 )
 from pamrs.diagnosis.prepare._slack import said_of_slack
-from pamrs.diagnosis.prepare._thermometers import without_poor_thermometers
 from pamrs.diagnosis.prepare._units import noted_units, suspected_units
 from pamrs.diagnosis.prepare._unread import (
     blocks_beside_tanks,

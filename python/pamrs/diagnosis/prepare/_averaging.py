@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Mask
 from pamrs.channels import channel_of
 from pamrs.diagnosis.prepare._blocks import Block
 from pamrs.diagnosis.prepare._signals import COMMANDS, held
@@ -18,9 +18,6 @@ from pamrs.recordings import Recording
 # [s] sample time that is needed where every block is a sealed chamber, which hardly moves
 _NEEDED_SEALED_SAMPLE_TIME = 0.1
 
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _HELD = (*COMMANDS, "reference")
 """Entry ``k`` holds from sample ``k`` to the next, where a measured one is of its instant."""

@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.channels import channel_of, with_trait
 from pamrs.diagnosis.prepare._signals import Prepared
 
 # [Pa] how far a pressure is followed back to before a recording: a rate at its edge is uncertain
 _MOST_MOVED = 2e4
 
-
-Array = NDArray[np.float64]
 
 _PRESSURES: Final = with_trait("pressure")
 

@@ -15,9 +15,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, Index, Mask
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._blocks import (
@@ -50,7 +50,6 @@ _STILL_DEVIATIONS = 3.0
 _REST_LIKELIHOOD = 1000.0
 
 
-Array = NDArray[np.float64]
 Tolerances = Mapping[str, float]
 
 
@@ -90,13 +89,11 @@ def begun_alike(
     return replace(prepared, at_rest=frozenset(rests), _begun={}) if rests else prepared
 
 
-def _unheard(
-    blocks: Sequence[Block], core: _core.Rig, prepared: Prepared
-) -> dict[str, NDArray[np.bool_]]:
+def _unheard(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> dict[str, Mask]:
     """Rows of each channel that show when a command changed in a hole, which nobody recorded: what
     is not measured behind it (a regulator's outlet, a spool, the flow in a tube) went on there.
     """
-    early, found = prepared.commanded_early(), dict[str, NDArray[np.bool_]]()
+    early, found = prepared.commanded_early(), dict[str, Mask]()
     if early is None:
         return found
     for block in blocks:
@@ -148,7 +145,7 @@ def _left_at_first(
     return float(rows @ rows)
 
 
-def _trend(prepared: Prepared, channel: str, rows: NDArray[np.intp]) -> float:
+def _trend(prepared: Prepared, channel: str, rows: Index) -> float:
     """Trend of some samples of a channel, in its standard deviations."""
     way = rows - rows.mean()
     trend = float(way @ prepared.recording.channels[channel][rows]) / float(np.sqrt(way @ way))

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array, Mask
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of, thermometers_of
@@ -38,9 +38,6 @@ _ARM_STEP = 5e-3
 _GAS_STEP = 1e-2
 # [s] the same of a sealed chamber: an error below the noise (docs/convergence.md)
 _SEALED_STEP = 0.025
-
-
-Array = NDArray[np.float64]
 
 
 class Tube(NamedTuple):
@@ -744,7 +741,7 @@ class Residual:
     value: Array
     jacobian: Array | None
     prediction: Array
-    rows: NDArray[np.bool_]
+    rows: Mask
     noise: float
     starts: list[tuple[int, int, Array]] = field(default_factory=list)
     temperature: float | None = None

@@ -18,6 +18,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
 
+from pamrs._arrays import Array, Index, Mask
 from pamrs.channels import channel_of
 from pamrs.recordings import Recording
 
@@ -61,9 +62,6 @@ _BESIDE_SAMPLES = 4
 # samples of a block that is looked for in a recording whose clock goes otherwise
 _BLOCK_SAMPLES = 256
 
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _SET: Final = ("valve_command", "supply_command", "reference")
 _TAPS: Final = 8  # deviations on either side by which one of the other recording is told
@@ -120,7 +118,7 @@ class _Channel(NamedTuple):
     deviations: Array
     step: float
 
-    def at(self, rows: NDArray[np.intp]) -> _Channel:
+    def at(self, rows: Index) -> _Channel:
         """The same at some rows."""
         return _Channel(self.values[rows], self.known[rows], self.deviations[rows], self.step)
 
@@ -212,9 +210,7 @@ def _channel(values: Array, known: Mask) -> _Channel:
     return _Channel(filled, known, np.where(inner & ~steps, left / size, 0.0), coarse)
 
 
-def _followed(
-    source: Array, offsets: NDArray[np.intp], wanted: Array, use: Mask
-) -> tuple[Array, Array]:
+def _followed(source: Array, offsets: Index, wanted: Array, use: Mask) -> tuple[Array, Array]:
     """What samples of a source at some offsets tell of each sample, by the linear combination that
     is nearest in some rows, and that combination.
     """

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Mask
 from pamrs.diagnosis.prepare._deviations import (
     LEAST_SAMPLES,
     WINDOW_SAMPLES,
@@ -30,10 +30,6 @@ _GAP = 2.5
 # [s] of a held-out recording that is kept as a proof: two long windows (decision 111)
 _LEAST_LEFT = 8.0
 _MOST_RATE_RATIO = 50.0  # ratio of sample times up to which recordings are compared
-
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._arrays import Array
 from pamrs.diagnosis.prepare._blocks import Block, residual
 from pamrs.diagnosis.prepare._signals import Prepared
 from pamrs.diagnosis.prepare._unread import begins_at, with_tanks
@@ -25,8 +25,6 @@ _OWN_STEPS = 12
 _OWN_APART = 1.5  # ratio of such values between recordings from which it is said
 _SHAKEN = 1e-3  # share by which a pressure is moved for the slope of what begins at it
 _BEGINS = "initial_pressure"
-
-Array = NDArray[np.float64]
 
 
 def varying(rig: Rig, core: _core.Rig) -> set[str]:

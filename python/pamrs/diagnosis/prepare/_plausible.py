@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs._arrays import stretches
+from pamrs._arrays import Array, Mask, stretches
 from pamrs.channels import block_of, channel_of, dotted, unit_of, with_trait
 from pamrs.diagnosis.prepare._blocks import Block, predicted
 from pamrs.diagnosis.prepare._signals import Prepared, moves_by_gauges
@@ -77,8 +76,6 @@ _SENSE_WRONG = 1.0
 # [standard deviations] misfit in another unit or sign below which that is the right one
 _SENSE_RIGHT = 0.4
 
-
-Array = NDArray[np.float64]
 
 _PRESSURES = with_trait("pressure")
 _DEGREES = 180.0 / math.pi  # of a radian
@@ -206,8 +203,8 @@ def without_impossible(
 
 
 def _lost(
-    values: Array, mask: NDArray[np.bool_], table: Mapping[str, Any], settings: DiagnosisSettings
-) -> tuple[NDArray[np.bool_], float, float]:
+    values: Array, mask: Mask, table: Mapping[str, Any], settings: DiagnosisSettings
+) -> tuple[Mask, float, float]:
     """Samples that a logger lost of a valve's command, and the range [V] beyond which they are.
 
     A controller may ask for more than its valve can do, and comes there from the end of the range
@@ -236,7 +233,7 @@ def _lost(
     return (beyond if lost and rare else np.zeros_like(beyond)), low, high
 
 
-def _when(bad: NDArray[np.bool_], recording: Recording) -> str:
+def _when(bad: Mask, recording: Recording) -> str:
     """The first stretches in which something is, in seconds."""
     pairs = stretches(bad)
     told = [
@@ -422,9 +419,7 @@ def _order(recording: Recording, rig: Rig) -> Iterator[str]:
                 )
 
 
-def _highest(
-    recording: Recording, rig: Rig, supply: str
-) -> tuple[str, NDArray[np.bool_], Array] | None:
+def _highest(recording: Recording, rig: Rig, supply: str) -> tuple[str, Mask, Array] | None:
     """What a supply's pressure is told by, where that is known, and the highest that it can be.
 
     That is its gauge; of a regulator without one the largest set pressure, since what it feeds

@@ -1,4 +1,6 @@
-"""Ends of a sensor's range: what one recording shows of them is masked in all."""
+"""Sensors that cannot be believed: ends of a range, which one recording shows and which are masked
+in all, and thermometers that lag behind the log.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +8,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from pamrs._arrays import Mask
+from pamrs.diagnosis.prepare._signals import few_usable, thermometers_of
 from pamrs.findings import Faulty
 from pamrs.recordings import Recording
+from pamrs.rig import Rig
 from pamrs.units import parse_unit
 
 # samples beside one at its sensor's end, masked as well: their noise is cut off on one side
 _RAIL_SAMPLES = 3
-
-
-Array = NDArray[np.float64]
 
 
 def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Faulty]]:
@@ -62,7 +63,7 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
     return found, said
 
 
-def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> NDArray[np.bool_]:
+def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> Mask:
     """Samples of a channel at the end of its range, and those beside them; those that are masked
     because they stay there included.
     """
@@ -78,11 +79,11 @@ def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> NDA
             # what is reported of several stretches together lies anywhere between its ends
             between = (recording.time >= issue.start) & (recording.time <= issue.stop)
             there |= between & ~mask
-    bad: NDArray[np.bool_] = binary_dilation(there, iterations=beside) if there.any() else there
+    bad: Mask = binary_dilation(there, iterations=beside) if there.any() else there
     return bad
 
 
-def _masked(recording: Recording, channel: str, bad: NDArray[np.bool_]) -> Recording:
+def _masked(recording: Recording, channel: str, bad: Mask) -> Recording:
     values = np.where(bad, np.nan, recording.channels[channel])
     mask = recording.mask[channel] & ~bad
     return replace(
@@ -113,3 +114,60 @@ def _sentence(
 
 _MOST_COUNTED = 6
 """Recordings whose samples are counted."""
+
+
+# share of new samples (no repeats, no lines) from which a thermometer keeps up with the log
+_LEAST_NEW_SHARE = 0.5
+
+
+def without_poor_thermometers(
+    recordings: Sequence[Recording], rig: Rig
+) -> tuple[list[Recording], list[str]]:
+    """Recordings without the temperatures of gases that cannot be judged in each of them, and
+    sentences that say so.
+
+    No block needs a thermometer: one that fails, or whose samples repeat or lie on straight lines
+    between fewer ones, is left out. The noise of the latter would be taken for far less than it is.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        What there is.
+    rig : Rig
+        The model.
+    """
+    said = []
+    for name in thermometers_of(rig).values():
+        faults = [
+            f"in {r.name!r} {fault}"
+            for r in recordings
+            if name in r.channels and (fault := _fault(r, name))
+        ]
+        if faults:
+            said.append(f"{name} is not judged: {'; '.join(faults)}")
+            recordings = [_without(r, name) for r in recordings]
+    return list(recordings), said
+
+
+def _fault(recording: Recording, name: str) -> str:
+    """Why a temperature cannot be judged; empty where it can."""
+    values, mask = recording.channels[name], recording.mask[name]
+    if few_usable(mask):
+        return f"only {int(mask.sum())} of {mask.size} samples are usable"
+    bends = np.abs(np.diff(values[mask], 2))
+    new = float(np.mean(bends > 1e-6 * float(np.ptp(values[mask]))))
+    if 0.0 < new < _LEAST_NEW_SHARE:
+        return (
+            f"one sample in {1.0 / new:.1f} is new, the others repeat or lie on lines between: log "
+            "it as fast as the pressures, or the pressures as slowly"
+        )
+    return ""
+
+
+def _without(recording: Recording, name: str) -> Recording:
+    """A recording without a channel."""
+    return replace(
+        recording,
+        channels={n: v for n, v in recording.channels.items() if n != name},
+        mask={n: v for n, v in recording.mask.items() if n != name},
+    )

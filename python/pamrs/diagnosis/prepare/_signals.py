@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.signal import savgol_filter
 from scipy.stats import chi2, norm
 
 from pamrs import _core
+from pamrs._arrays import Array, Index, Mask
 from pamrs.channels import block_of, channel_of, dotted, with_trait
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
@@ -53,9 +53,7 @@ _LEAST_CHANNEL_SAMPLES = 11  # fewest usable samples of a channel
 _LEAST_CHANNEL_SHARE = 0.2  # share of a channel's samples that must be usable
 
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Lengths = NDArray[np.intp]
+Lengths = Index
 
 _TERMS = 4
 """Terms of a cubic."""

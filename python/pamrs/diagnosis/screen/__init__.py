@@ -4,8 +4,6 @@ Public: `Score`, `Screen`, `Tangent`, `screen`, `tangent_of`, `by_effect`, `best
 `predicted_by_others`.
 """
 
-from __future__ import annotations
-
 from pamrs.diagnosis.screen._leave_one_out import predicted_by_others
 from pamrs.diagnosis.screen._screening import (
     STRONG_SIZES,

@@ -8,8 +8,8 @@ import itertools
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Fit, Key, Problem, bin_width, residuals, stacked
 from pamrs.diagnosis.prepare import Residual
 
@@ -17,8 +17,6 @@ from pamrs.diagnosis.prepare import Residual
 _SOLE_SOURCE = 0.9
 _PIECES_LEFT_OUT = 5  # pieces of a single recording, each predicted by the others (decision 111)
 
-
-Array = NDArray[np.float64]
 
 _RIDGE = 1e-9  # keeps a matrix invertible
 

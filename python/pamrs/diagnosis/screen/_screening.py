@@ -14,10 +14,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs._arrays import solve_normal
+from pamrs._arrays import Array, solve_normal
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import (
     Fit,
@@ -54,7 +53,6 @@ _PLACE_SHARES = (0.5, 0.75, 0.93)
 _OPENING_SHARES = (0.6, 3.0)
 
 
-Array = NDArray[np.float64]
 Signature = tuple[Term, Start, Array]
 """Effect, where it starts, and what it does to the stacked residuals there."""
 _Values = tuple[str, str, tuple[tuple[str, float], ...]]

@@ -5,8 +5,6 @@ baseline alone), `find_misread`, `Reading`, `reading_errors` (other units of cha
 `find_closure`, `free_suspects`, `find_wrong_values`, `suspected_values`.
 """
 
-from __future__ import annotations
-
 from pamrs.diagnosis.search._baseline import refitted, with_autocorrelation
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._hypotheses import Mismatch, examine

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._arrays import Array, Mask
 from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, residuals, stacked, with_priors
 from pamrs.diagnosis.noise import NoiseLevel, correlation_time
@@ -42,9 +43,6 @@ _EVALUATIONS = 5  # evaluations of the fit of the chosen terms at the most
 # share of the linear estimate from which the fit is tried where the whole of it gains nothing
 _SHRUNK_SHARE = 0.4
 _SHRUNK_EVALUATIONS = 3  # evaluations of that fit at the most
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -470,7 +468,7 @@ class _Selection:
         self.left = self.left - direction * float(direction @ self.left)
         self._free = self._free - np.outer(direction, direction @ self._free)
 
-    def most_telling(self, usable: NDArray[np.bool_]) -> int | None:
+    def most_telling(self, usable: Mask) -> int | None:
         """The term that explains most of what is left; memories keep the shape that the first of
         them has.
         """

@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.fit import (
     Fit,
@@ -57,8 +57,6 @@ _CLOSER = 0.25
 # part of an offset, and share of a factor, by which it is moved for its derivative
 _FREE_STEP = 0.005
 
-
-Array = NDArray[np.float64]
 
 OTHERS: Final[dict[str, tuple[str, ...]]] = {
     "Pa": ("Pa", "hPa", "mmHg", "inH2O", "kPa", "psi", "mH2O", "kgf/cm2", "bar", "atm", "MPa"),

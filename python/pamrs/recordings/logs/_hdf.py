@@ -8,10 +8,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from pamrs._arrays import Array
 from pamrs._files import MOST_DEPTH, MOST_PARTS
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import Gate
-from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
+from pamrs.recordings.logs._log import Log, Series, TextFormat, collected
 from pamrs.recordings.logs._tables import series_of_matrix
 
 _UNITS: Final = ("unit", "units", "Unit", "Units", "UNIT")

@@ -10,17 +10,14 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._files import MOST_SIZE
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import check_size
 from pamrs.recordings._stamps import TIME_UNITS
 from pamrs.recordings.table import Table
 from pamrs.units import parse_unit
-
-Array = NDArray[np.float64]
-
 
 #: What a heading has behind its name: a unit in brackets (a number there tells two columns of one
 #: name from each other), and what parts it from the name.

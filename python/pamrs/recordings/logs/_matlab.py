@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from pamrs._arrays import Array
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import Gate, admit_matlab
 from pamrs.recordings.logs._hdf import leads_elsewhere, members
-from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected, numbers_of
+from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, numbers_of
 from pamrs.recordings.logs._tables import series_of_matrix
 from pamrs.recordings.logs._words import understood_unit
 from pamrs.units import parse_unit, same_dimension

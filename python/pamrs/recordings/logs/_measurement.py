@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from pamrs._arrays import Array
 from pamrs.recordings._gate import Gate
-from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected, numbers_of
+from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, numbers_of
 
 _SILENCE = threading.Lock()
 """Only one file at a time is opened without what Python says of failing destructors."""

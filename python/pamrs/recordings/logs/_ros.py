@@ -13,10 +13,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._arrays import Array
 from pamrs._files import MOST_BYTES, check_regular, read_file
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import Unpacking, check_size
-from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
+from pamrs.recordings.logs._log import Log, Series, TextFormat, collected
 
 _MOST_ELEMENTS: Final = 64  # of an array in a message; longer ones are images and the like
 _DEEPEST: Final = 8
