@@ -54,7 +54,7 @@ def title(diagnosis: Findings) -> str:
     if not parts:
         wrong = [f"{law.name} is {law.other}, not {law.stated}" for law in diagnosis.laws]
         return f"The rig file is wrong: {wrong[0]}" if wrong else _healthy(diagnosis)
-    together = _together(parts, doubt=False)
+    together = _together(parts, doubt=bool(diagnosis.answer.missed))
     if together and len(together.split()) <= LONGEST:
         return together
     others = _listed([_place(part) for part in parts[1:]], 2, "and")
