@@ -115,12 +115,18 @@ class Steps:
                 own = low + (high - low) * sum(self._parts.values()) / len(self._parts)
             self._share = max(self._share, own or 0.0)
             passed = self._clock() - self._began
-            known = self._share >= _LEAST_SHARE
-            left = passed * (1.0 - self._share) / self._share if known else None
-            line = Line(text, self._share, left)
+            line = Line(text, self._share, _time_left(passed, self._share))
         # outside of the lock, since whoever gets a line may wait for another thread
         LOG.info("%s", line.whole)
         self._to(line)
+
+
+def _time_left(passed: float, share: float) -> float | None:
+    """How long a work goes on that took so long for a share [s]; None at its begin, and near its
+    end, where one more law of the rig file may be tried.
+    """
+    known = _LEAST_SHARE <= share < _NEARLY or share == 1.0
+    return passed * (1.0 - share) / share if known else None
 
 
 @contextmanager
@@ -139,8 +145,7 @@ def at_even_times(
             if share is None:
                 tell(f"{line}: {duration_words(passed)} so far")
                 continue
-            left = passed * (1.0 - share) / share if share >= _LEAST_SHARE else None
-            tell(Line(line, share, left).whole)
+            tell(Line(line, share, _time_left(passed, share)).whole)
 
     thread = threading.Thread(target=go_on, daemon=True)
     thread.start()
