@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
-    ".": 1107,
+    ".": 1108,
     "cli": 1376,
     "control": 4622,
     "design": 532,
@@ -47,7 +47,7 @@ ASIDE = {
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35789
+MOST = 35790
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 
