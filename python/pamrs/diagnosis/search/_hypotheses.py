@@ -79,7 +79,11 @@ from pamrs.diagnosis.search._sets import (
     settles,
     with_freed_values,
 )
-from pamrs.diagnosis.search._wrong_parameters import find_wrong_values, free_suspects, weigh_quiet
+from pamrs.diagnosis.search._wrong_parameters import (
+    find_wrong_values,
+    free_suspects,
+    weigh_only_noise,
+)
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
     CATALOGUE,
@@ -155,12 +159,12 @@ def examine(
         names = " and ".join(b.name for b in blocks)
         say(Line(f"{names}: judged", 1.0, part=names))
 
-    def begin(blocks: list[Block]) -> Mismatch | Quiet | None:
+    def begin(blocks: list[Block]) -> Mismatch | OnlyNoise | None:
         what = f"the judgement of {' and '.join(b.name for b in blocks)}"
         work = partial(_begin_part, fitted, held, nominal, blocks, say)
         return losses.part(what, work, through=through)
 
-    def end(part: Mismatch | Quiet | None) -> list[BlockGroup]:
+    def end(part: Mismatch | OnlyNoise | None) -> list[BlockGroup]:
         if part is None:
             return []
         others = [p for p in begun if isinstance(p, Mismatch) and p is not part]
@@ -190,7 +194,7 @@ def examine(
 
 def _begin_part(
     fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say
-) -> Mismatch | Quiet:
+) -> Mismatch | OnlyNoise:
     """Some blocks examined by themselves: a mismatch with its hypotheses, or, where they keep only
     noise, the group that they are.
     """
@@ -214,14 +218,14 @@ def _begin_part(
         common = inner.losses.part(what, lambda: _fit_all_recordings(refit.trial, refit.start))
         if common is not None:
             tell("one baseline leaves noise in all recordings")
-            return Quiet(refit, _healthy_group(refit, common))
+            return OnlyNoise(refit, _healthy_group(refit, common))
     if refit.trial.suspects:
         return _tried(refit, tell)
     quiet = refit.group([refit.start], {UNDECIDED: 1.0}, None)
     trial = replace(refit.trial, suspects=blocks)
     what = "the search for a value at the end of its range"
     found = inner.losses.part(what, lambda: find_wrong_values(trial, quiet, tell), quiet)
-    return Quiet(refit, found)
+    return OnlyNoise(refit, found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -581,7 +585,7 @@ class Mismatch:
 
 
 @dataclass(frozen=True, eq=False)
-class Quiet:
+class OnlyNoise:
     """Some blocks of which the refit leaves only noise.
 
     Attributes
@@ -595,7 +599,7 @@ class Quiet:
     refit: _Refit
     group: BlockGroup
 
-    def with_effects_of_others(self, starts: list[Start]) -> Quiet:
+    def with_effects_of_others(self, starts: list[Start]) -> OnlyNoise:
         """The same with what other blocks name tried here, where it acts: it costs nothing again,
         and is there where recordings and values are as probable with it.
         """
@@ -609,7 +613,7 @@ class Quiet:
             first = trial.fit_effects([known], baseline, trial.white)
             both = first and trial.fit_effects([start], first.fit, trial.white)
             found += [both] if both and _is_visible(both, start) else []
-        return replace(self, group=weigh_quiet(self.group, dict.fromkeys(found, 0.0)))
+        return replace(self, group=weigh_only_noise(self.group, dict.fromkeys(found, 0.0)))
 
     def groups(self, _: Say) -> list[BlockGroup]:
         """The blocks as one group."""

@@ -285,10 +285,10 @@ def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], N
     # a file that is further outside its tolerances is rarer, but less and less so
     settings, walls = trial.settings, trial.settings.most_tolerances
     prices = {c: settings.file_log_odds * len(c.wrong) + c.outside(walls) for c in found}
-    return weigh_quiet(quiet, prices)
+    return weigh_only_noise(quiet, prices)
 
 
-def weigh_quiet(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> BlockGroup:
+def weigh_only_noise(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> BlockGroup:
     """A group whose baseline leaves only noise, with further hypotheses and the logarithm of what
     each costs; those that leave more than noise, or predict worse, are left out.
     """
