@@ -5,6 +5,7 @@ and of a healthy arm nothing is.
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -136,6 +137,9 @@ def test_a_diagnosis_has_it_with_the_law_of_what_it_names() -> None:
     assert missing is not None
     assert missing.block == found.answer.block == "arm"
     assert {own.role for own in missing.recordings} == {"fit", "held_out"}
+    share = re.search(r", of which (\d+)% is what is named$", missing.sentence)
+    assert share is not None
+    assert float(share[1]) > 95.0
     for own in missing.recordings:
         assert own.value.size <= 400
         assert own.law is not None

@@ -17,6 +17,7 @@ from pamrs.findings._entry import OPTIONAL, Entry, to_plain
 
 _POINTS = (24, 120)  # of a curve in a picture, and of one over time
 _LETTERS = 76  # of a line above it
+_ROOM = 0.25  # of the height of its bands, above and below them
 _LEAST_IN_POINT = 4  # values that make one of them
 
 
@@ -183,16 +184,20 @@ def _draw(found: MissingInput, axes: Any) -> None:
         axes.plot(x[rows], y[rows], ".", color=colour, ms=3.0, alpha=0.4, rasterized=True)
     if argument == "time":
         strokes = [(np.ones_like(up), told[0].recording, "#6b7280")]
+    ends = []
     for rows, name, colour in strokes:
         columns = (x[rows], y[rows], std[rows] ** 2, (y if law is None else law)[rows])
         there, middle, wide, named = _means(columns, _POINTS[argument == "time"])
         band = 2.0 * np.sqrt(wide)
         axes.fill_between(there, middle - band, middle + band, color=colour, alpha=0.25, lw=0.0)
         axes.plot(there, middle, color=colour, lw=1.4, label=name)
+        ends += [float(np.min(middle - band)), float(np.max(middle + band))]
         if law is not None:
             last = "what is named" if name == strokes[-1][1] else None
             axes.plot(there, named, color="black", lw=1.2, ls="--", label=last)
     axes.axhline(0.0, color="#6b7280", lw=0.7)
+    room = _ROOM * (max(ends) - min(ends))
+    axes.set_ylim(min(ends) - room, max(ends) + room)  # single points may be far outside the band
     axes.set_title(textwrap.fill(f"Missing: {found.sentence}", _LETTERS), fontsize="medium")
     axes.set_xlabel(f"{argument.replace('_', ' ')} [{of}]")
     axes.set_ylabel(f"missing, {found.block.replace('_', ' ')} [{unit}]")

@@ -142,8 +142,9 @@ def explained(found: MissingInput) -> tuple[str, float, str]:
     best = max(told.values())
     name = next(n for n, share in told.items() if share > best - _CLEARER)
     if best < _LEAST_TOLD:
-        size = along.mean(np.abs(along.value), along.weight > 0.0)
-        return "", max(0.0, best), f"{_shown(size, found.unit)}, and no single argument explains it"
+        size = _shown(along.mean(np.abs(along.value), along.weight > 0.0), found.unit)
+        named = _taken(found, along)
+        return "", max(0.0, best), f"{size}{named or ', and no single argument explains it'}"
     columns = candidates[name]
     others = [n for n in found.units if n not in (name, "time", found.rate)]
     others = [n for n in others if not (name == "strokes" and n == found.position)]
@@ -158,7 +159,19 @@ def explained(found: MissingInput) -> tuple[str, float, str]:
     if beside:
         sentence += _beside(found, along, name, beside)
     argument = {"": "time", "strokes": found.position}.get(name, name)
-    return argument, min(1.0, max(told[name], 0.0)), sentence
+    return argument, min(1.0, max(told[name], 0.0)), sentence + _taken(found, along)
+
+
+def _taken(found: MissingInput, along: _Along) -> str:
+    """How much of an input's square the named effects take, in words; empty where they take less
+    than an argument would that explains it.
+    """
+    laws = [own.law for own in found.recordings if own.law is not None]
+    if len(laws) < len(found.recordings):
+        return ""
+    left, whole = (along.value - np.concatenate(laws)) ** 2, along.value**2
+    share = 1.0 - float(along.weight @ left) / max(float(along.weight @ whole), 1e-300)
+    return f", of which {share:.0%} is what is named" if share > _LEAST_TOLD else ""
 
 
 def _scaled(x: Array) -> Array:
