@@ -2,7 +2,7 @@
 
 Errors that the work expects are handled where they arise; here is what nobody expected: a mistake
 of the program, a matrix that cannot be inverted, memory that is not there. Under a test
-(``PAMRS_STRICT`` in the environment, which ``tests/conftest.py`` sets) it is raised as it is, so
+(``PAMRS_STRICT`` in the environment, which ``conftest.py`` sets) it is raised as it is, so
 that a mistake cannot hide in a warning.
 """
 

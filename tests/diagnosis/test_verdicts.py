@@ -231,8 +231,7 @@ def test_sentences_have_units_of_the_field() -> None:
     assert sentence_of(wrong) == "chamber dead volume is 360.0 +- 5.0 cm3, not 150 +- 22"
     kept = Unexplained("arm", "joint_angle", "rad", 15.2, 0.007, "unlisted")
     assert kept_sentence(kept) == (
-        "the residual of the arm is 15 times the noise level (0.40 deg), and nothing that was "
-        "tried explains it"
+        "the residual of the arm is 15 times the noise level (0.40 deg), and no name explains it"
     )
 
 
@@ -242,3 +241,16 @@ def test_a_wrong_value_is_named_beside_an_effect() -> None:
     assert verdict == "effects"
     assert judged[0].named == terms("clock_skew")
     assert judged[0].wrong == ("valve.discharge_area_max",)
+
+
+@pytest.mark.parametrize(("left", "verdict"), [(0.4, "parameters"), (0.6, "unlisted")])
+def test_less_than_half_a_noise_level_is_no_physics_without_a_name(
+    left: float, verdict: str
+) -> None:
+    own = group("chamber", {"unlisted": 1.0}, shifted=True)
+    size = {"chamber": Excess(3.0, left, 0.0, 1.0, 1.0, 1.1)}
+    base = replace(own.candidates[0], fitted=size, held_out=size)
+    (found,) = judge([replace(own, candidates=[base])], SETTINGS)
+    assert found.verdict == verdict
+    chance = found.probabilities[Hypothesis((), "unlisted")]
+    assert chance == pytest.approx(1.0 if verdict == "unlisted" else 0.14)

@@ -23,14 +23,14 @@ PACKAGES = {
     "cli": 1376,
     "control": 4622,
     "design": 532,
-    "diagnosis": 10875,
+    "diagnosis": 10897,
     "effects": 408,
     "experiments": 1060,
-    "findings": 911,
+    "findings": 913,
     "fit": 2965,
     "library": 71,
     "recordings": 4882,
-    "report": 2042,
+    "report": 2044,
     "rig": 2238,
     "rigs": 139,
     "simulation": 1095,
@@ -39,7 +39,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 26584,
+    "tests": 26592,
     "benchmarks/tests": 226,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -47,7 +47,7 @@ ASIDE = {
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35804
+MOST = 35830
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

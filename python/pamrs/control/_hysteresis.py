@@ -10,8 +10,7 @@ the pressure, so that every law that inverts ``C1 P + C2`` inverts it with
 
     C1' = C1 + n c z r(theta)        C2' = C2 + n W0 z r(theta)
 
-``r`` the torque arm. The static effect ``activation_pressure`` shifts the line, ``C2' - C1' p_th``,
-and ``valve_dead_zone`` is undone by :class:`DeadZoneCompensation`.
+``r`` the torque arm. The static effect ``activation_pressure`` shifts the line, ``C2' - C1' p_th``.
 """
 
 from __future__ import annotations

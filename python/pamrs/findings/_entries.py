@@ -530,7 +530,7 @@ class FreeRunError(Entry):
     cut_before, cut_after : float or None
         Of the block driven by its measured neighbours; None where no block predicts the channel.
     noise : float or None
-        Sample noise of the channel.
+        Sample noise of the channel, with what the drives of its block bring into it.
     off : bool
         Whether `after` is many noise levels, and more than the values of the rig, as far as they
         are known, explain: evidence that something is missing, whatever the blocks say.

@@ -179,7 +179,8 @@ def _draw(found: MissingInput, axes: Any) -> None:
     up = np.concatenate([own.arguments[found.rate] for own in told]) > 0.0
     laws = [own.law for own in told if own.law is not None]
     law = factor * np.concatenate(laws) if len(laws) == len(told) else None
-    strokes = [(up, "up stroke", COLOURS[0]), (~up, "down stroke", COLOURS[1])]
+    both = [(up, "up stroke", COLOURS[0]), (~up, "down stroke", COLOURS[1])]
+    strokes = [one for one in both if one[0].any()]
     for rows, _, colour in strokes:
         axes.plot(x[rows], y[rows], ".", color=colour, ms=3.0, alpha=0.4, rasterized=True)
     if argument == "time":
@@ -191,7 +192,8 @@ def _draw(found: MissingInput, axes: Any) -> None:
         band = 2.0 * np.sqrt(wide)
         axes.fill_between(there, middle - band, middle + band, color=colour, alpha=0.25, lw=0.0)
         axes.plot(there, middle, color=colour, lw=1.4, label=name)
-        ends += [float(np.min(middle - band)), float(np.max(middle + band))]
+        every = np.concatenate([middle - band, middle + band, named])
+        ends += [float(every.min()), float(every.max())]
         if law is not None:
             last = "what is named" if name == strokes[-1][1] else None
             axes.plot(there, named, color="black", lw=1.2, ls="--", label=last)

@@ -51,6 +51,8 @@ def title(diagnosis: Findings) -> str:
     parts = diagnosis.answer.parts
     if diagnosis.answer.missed and not diagnosis.answer.named:
         return words.missed_sentence(diagnosis, 1)
+    if diagnosis.answer.missed:
+        parts = [part for part in parts if words.searched(part)]
     if not parts:
         wrong = [f"{law.name} is {law.other}, not {law.stated}" for law in diagnosis.laws]
         return f"The rig file is wrong: {wrong[0]}" if wrong else _healthy(diagnosis)

@@ -30,6 +30,7 @@ from pamrs.diagnosis.evidence._determined import (
 )
 from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
 from pamrs.diagnosis.evidence._verdicts import (
+    SHARED_ODDS,
     WALL_TOLERANCES,
     Judged,
     case_ambiguity,
@@ -51,6 +52,7 @@ from pamrs.diagnosis.evidence._weighing import (
 )
 
 __all__ = [
+    "SHARED_ODDS",
     "WALL_TOLERANCES",
     "FORM_SHARE_ALIKE",
     "Attempts",

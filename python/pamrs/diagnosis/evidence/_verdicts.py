@@ -31,7 +31,7 @@ from pamrs.effects import (
 
 _HEALTHY = (NONE, PARAMETERS)  # hypotheses of which nothing is missing
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
-_SHARED_ODDS = 6.0
+SHARED_ODDS = 6.0
 _ALIKE_STDS = 3.0  # [standard deviations] by which the values of one name in two groups may differ
 # share of the larger by which values differ however well known, as models err: a factor of two
 _ALIKE_SHARE = 0.5
@@ -50,6 +50,9 @@ _STRAINED_PARAMETERS = 0.75
 _STRAINED_UNLISTED = 0.25  # probability of unlisted there (decision 4)
 # [tolerances] moved to its wall (fit.most_tolerances), which is suspect (decision 25)
 WALL_TOLERANCES = 2.9
+# [noise levels] left in a group below which nothing has no name: both such groups of 40 read cases
+# lacked nothing (decision 4)
+_LEAST_UNLISTED = 0.5
 _UNLIKELY = 0.01  # chance of a baseline below which its values count against it
 
 
@@ -112,6 +115,8 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
     """
     found = {h: p for h, p in group.probabilities.items() if h != UNDECIDED}
     unchanged = group.probabilities.get(UNDECIDED, 0.0)
+    if _leaves_little(group):
+        unchanged += found.pop(UNLISTED, 0.0)
     shifted = any(significant(e) for e in group.nominal.values())
     explained = any(c.wrong and found.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates)
     quiet = {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
@@ -123,6 +128,13 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
     for hypothesis, share in quiet.items():
         found[hypothesis] = found.get(hypothesis, 0.0) + unchanged * share
     return {h: p for h, p in found.items() if p >= _COUNTED or h in WITHOUT_NAME}
+
+
+def _leaves_little(group: BlockGroup) -> bool:
+    """True where the refit leaves less of every block than what has no name would be told by."""
+    start = group.candidates[0]
+    every = [*start.fitted.values(), *start.held_out.values()]
+    return bool(every) and max(e.systematic for e in every) < _LEAST_UNLISTED
 
 
 def _is_unlikely(fit: Fit) -> bool:
@@ -201,7 +213,7 @@ def _odds_shared(
         price_of_term(c, term, settings) for group, c in holders if group.mismatch is not None
     ]
     again = sum(prices) - max(prices, default=0.0)
-    return _SHARED_ODDS ** (len(holders) - 1) * math.exp(again)
+    return SHARED_ODDS ** (len(holders) - 1) * math.exp(again)
 
 
 def _same_values(term: Term, candidates: Sequence[Candidate]) -> bool:

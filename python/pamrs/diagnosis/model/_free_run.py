@@ -213,7 +213,9 @@ def _judged(
         part = f"whether it is off was asked of its first {logged.duration:.4g} s"
         note = f"{note}; {part}" if note else part
     left = _left(prepared, logged, final, known)
-    off = {name for name in doubtful if left.get(name, math.inf) > _OFF_NOISES}
+    # drives bring noise into a block, and so into what its channel's error is compared with
+    noises = {n: prepared.noise[recorded_as(n)] / (run.channels[n].noise or 1.0) for n in doubtful}
+    off = {n for n in doubtful if left.get(n, math.inf) * noises[n] > _OFF_NOISES}
     far = {recorded_as(name) for name in off}
     drives = {b.channel: far.intersection(b.drives) for b in blocks if b.mechanical}
     for name in list(off):

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from pamrs._progress import Line
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
+    SHARED_ODDS,
     Attempts,
     BlockGroup,
     Candidate,
@@ -114,6 +115,7 @@ _LEAST_GAIN_SHARE = 0.08  # share of the largest gain from which an effect is fi
 # share of an effect's best gain from which another of its starts is fitted (decision 13)
 _NEAR_START = 0.6
 _NEAR_FORM = 0.3  # share of the best gain that fits another form: strong effects are not linear
+_ALIKE_STDS = 3.0  # standard deviations within which two blocks give an effect the same values
 _MOST_FORMS = 4  # forms of an effect that are fitted
 _EFFECTS_WITH_STARTS = 3  # effects of which more than one start is fitted (decision 13)
 _REFITTED = 0.3  # share of the work on some blocks that their refit is
@@ -162,7 +164,10 @@ def examine(
     def begin(blocks: list[Block]) -> Mismatch | OnlyNoise | None:
         what = f"the judgement of {' and '.join(b.name for b in blocks)}"
         work = partial(_begin_part, fitted, held, nominal, blocks, say)
-        return losses.part(what, work, through=through)
+        found = losses.part(what, work, through=through)
+        if found is None:
+            judged(blocks)
+        return found
 
     def end(part: Mismatch | OnlyNoise | None) -> list[BlockGroup]:
         if part is None:
@@ -600,20 +605,25 @@ class OnlyNoise:
     group: BlockGroup
 
     def with_effects_of_others(self, starts: list[Start]) -> OnlyNoise:
-        """The same with what other blocks name tried here, where it acts: it costs nothing again,
-        and is there where recordings and values are as probable with it.
+        """The same with what other blocks name tried here, where it acts: it is there where
+        recordings and values are as probable with it, at the values that it has there.
         """
         trial = replace(self.refit.trial, suspects=self.group.blocks)
-        baseline = self.group.candidates[0].fit
-        acting = [s for s in starts if any(acts_in(s.effect, b) for b in trial.suspects)]
+        baseline = self.group.candidates[0]
+        if baseline is not self.refit.start:
+            return self  # one fit of all recordings: no hypothesis is compared with it
         found = []
-        for start in acting:
-            # at the values that it has there, before what the baseline hid it by lets go of it
+        for start in starts:
+            if not any(acts_in(start.effect, b) for b in trial.suspects):
+                continue
+            # held first: what the baseline hid it by has to let go of it
             known = replace(start, free={}, held=start.held | start.free)
-            first = trial.fit_effects([known], baseline, trial.white)
+            first = trial.fit_effects([known], baseline.fit, trial.white)
             both = first and trial.fit_effects([start], first.fit, trial.white)
-            found += [both] if both and _is_visible(both, start) else []
-        return replace(self, group=weigh_only_noise(self.group, dict.fromkeys(found, 0.0)))
+            found += [both] if both and _is_visible(both, start) and _is_alike(both, start) else []
+        # what is there once is paid for once: the odds of both places are given for both
+        prices = dict.fromkeys(_best_of_each(found), math.log(SHARED_ODDS))
+        return replace(self, group=weigh_only_noise(self.group, prices))
 
     def groups(self, _: Say) -> list[BlockGroup]:
         """The blocks as one group."""
@@ -698,6 +708,15 @@ def _nearly_as_heavy(
 def _is_visible(candidate: Candidate, start: Start) -> bool:
     """Whether recordings depend on any parameter of an effect that was fitted."""
     return any(math.isfinite(candidate.fit.std[name]) for name in start.free)
+
+
+def _is_alike(candidate: Candidate, start: Start) -> bool:
+    """Whether an effect kept the values from which it was fitted, as far as they are known."""
+    found = candidate.fit
+    return all(
+        abs(found.values[name] - value) <= max(_ALIKE_STDS * found.std[name], 0.5 * abs(value))
+        for name, value in start.free.items()
+    )
 
 
 def _weigh_to_the_end(

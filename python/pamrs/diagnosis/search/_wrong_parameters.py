@@ -27,6 +27,7 @@ from pamrs.diagnosis.fit import (
     two_at_a_time,
 )
 from pamrs.diagnosis.prepare import Block
+from pamrs.effects import UNDECIDED
 from pamrs.rig import Rig
 from pamrs.rig.schema import split_name
 
@@ -298,8 +299,10 @@ def weigh_only_noise(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> Bl
         for c, price in prices.items()
         if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)
     }
-    top = max(0.0, *scores.values(), 0.0)
-    weights = {c.hypothesis: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
+    top, kept_at = max(0.0, *scores.values(), 0.0), quiet.probabilities[UNDECIDED]
+    weights = {
+        c.hypothesis: kept_at * math.exp(max(-60.0, score - top)) for c, score in scores.items()
+    }
     kept = {h: p * math.exp(-top) for h, p in quiet.probabilities.items()}
     total = sum(weights.values()) + sum(kept.values())
     probabilities = {h: w / total for h, w in (kept | weights).items()}
