@@ -137,7 +137,7 @@ def test_a_diagnosis_has_it_with_the_law_of_what_it_names() -> None:
     assert missing is not None
     assert missing.block == found.answer.block == "arm"
     assert {own.role for own in missing.recordings} == {"fit", "held_out"}
-    share = re.search(r", of which (\d+)% is what is named$", missing.sentence)
+    share = re.search(r", of which (\d+) % is what is named$", missing.sentence)
     assert share is not None
     assert float(share[1]) > 95.0
     for own in missing.recordings:

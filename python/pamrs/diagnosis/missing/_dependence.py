@@ -171,7 +171,7 @@ def _taken(found: MissingInput, along: _Along) -> str:
         return ""
     left, whole = (along.value - np.concatenate(laws)) ** 2, along.value**2
     share = 1.0 - float(along.weight @ left) / max(float(along.weight @ whole), 1e-300)
-    return f", of which {share:.0%} is what is named" if share > _LEAST_TOLD else ""
+    return f", of which {100.0 * share:.0f} % is what is named" if share > _LEAST_TOLD else ""
 
 
 def _scaled(x: Array) -> Array:
