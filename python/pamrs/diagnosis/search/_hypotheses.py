@@ -173,7 +173,9 @@ def examine(
         if part is None:
             return []
         others = [p for p in begun if isinstance(p, Mismatch) and p is not part]
-        starts = [start for p in others for start in p.leading]
+        # where only noise is left nothing parts the names that are open elsewhere
+        sure = others if isinstance(part, Mismatch) else [p for p in others if p.is_settled]
+        starts = [start for p in sure for start in p.leading]
         names = " and ".join(b.name for b in part.refit.trial.inner.blocks)
         beside = losses.part(
             f"what other blocks name, tried in {names},",
@@ -530,6 +532,11 @@ class Mismatch:
     search: Search
     candidates: list[Candidate]
     weighed: dict[Hypothesis, float]
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether one hypothesis is as probable as an answer that leaves no other open."""
+        return max(self.weighed.values()) > self.refit.trial.settings.settled
 
     @property
     def leading(self) -> list[Start]:
