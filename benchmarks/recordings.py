@@ -1,10 +1,10 @@
 """``python -m benchmarks.recordings OUT --page PAGE``: what the diagnosis says about the recordings
 of others, as one page of budgets.
 
-Seven sealed chambers and four cylinders (Zillen, TU Delft) and the base joint of a four-joint arm
-(Shaj et al., on the arm of Buechler et al.). The recordings are read where they are; nothing of
-them is written. No key exists: what is known of a rig is a sentence, and the mark is ``right``,
-``wrong`` or ``cannot tell``.
+Seven sealed chambers and four cylinders (Zillen, TU Delft), the base joint of a four-joint arm
+(Shaj et al., on the arm of Buechler et al.) and a ventilator's test lung (RespiraWorks). The
+recordings are read where they are; nothing of them is written. No key exists: what is known of a
+rig is a sentence, and the mark is ``right``, ``partly``, ``wrong`` or ``cannot tell``.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem, residuals
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.errors import PamrsError, RecordingError
+from pamrs.findings import HEALTHY
 from pamrs.recordings import Case
 from pamrs.simulation import core_rig
 from trial.summary import table
@@ -42,6 +44,21 @@ CHAMBERS = (*LEAKING, "Prusa", "Ultimaker_010", "Ultimaker_006", "Formlabs", "Al
 UNITS = (3.0, 1.5, 6.0)
 """Assumed gauge pressures of the arm's scaled value 1 [bar]; nothing documents it."""
 ARM = "pam_arm_shaj"
+LUNGS = "respiraworks"
+VENTILATOR = "RespiraWorks_Ventilator"
+"""Checkout or git directory of the ventilator's authors, in the folder of the recordings."""
+KNOWN = {
+    "wrong_resistor": ("Rp 5 instead of the noted Rp 20", ("line.discharge_area",)),
+    "missing_setting": ("10 cmH2O/(l/s) noted, Rp 20 used", ("line.discharge_area",)),
+    "unit_new": ("kPa under a heading of cmH2O", ("kPa",)),
+    "unit_old": ("kPa under a heading of cmH2O", ("kPa",)),
+    "hose_off": ("the hose is off from 3.4 to 13.5 s", ("leak_muscle",)),
+    "obstruction": ("the resistor is shut for some seconds", ("tube_flow_restriction",)),
+    "flow_drift": ("the zero of the flow meters", ("gauge_drift",)),
+}
+"""What the authors wrote of the lung's recordings, and the right answers; of others nothing."""
+PARTLY = ("line.discharge_area", "line_flow_law", "tube_flow_restriction")
+"""Names at the resistor: where it is another one, the place is right and the name is not."""
 FRICTION = ("arm.viscous", "arm.coulomb")
 WALL = 2.9
 """Tolerances from which a parameter counts as being at its wall, which is at 3."""
@@ -68,16 +85,43 @@ def diagnosed(case: Case, say: Say) -> dict[str, Any]:
     return told
 
 
+def converter(folder: Path) -> ModuleType:
+    """The module ``convert.py`` of a folder of `cases`."""
+    spec = importlib.util.spec_from_file_location(folder.name, folder / "convert.py")
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{folder}: convert.py is missing")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[folder.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
 def arm_case(cases: Path, recordings: Path, out: Path, unit: float) -> Case:
     """The case of the arm's base joint with an assumed unit of pressure [bar], written to `out`."""
-    spec = importlib.util.spec_from_file_location("convert", cases / ARM / "convert.py")
-    if spec is None or spec.loader is None:
-        raise ValueError(f"{cases / ARM}: convert.py is missing")
-    convert = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(convert)
     folder, data = out / f"arm_{unit:g}", recordings / ARM / "data" / "PAMData" / "Data2"
-    convert.convert(folder, unit_bar=unit, rate=100.0, data=data)
+    converter(cases / ARM).convert(folder, unit_bar=unit, rate=100.0, data=data)
     return pamrs.load_case(folder)
+
+
+def lung_tables(cases: Path, repository: Path, out: Path, say: Say) -> tuple[str, str]:
+    """Answers and marks of the test lung's recordings; that they are not there, where it is so."""
+    if not repository.exists():
+        say(f"{repository}: not there, the lung's recordings are left out")
+        return "The recordings were not there when this page was made.", ""
+    rows: list[tuple[str, ...]] = []
+    marks: list[tuple[str, str]] = []
+    for name in converter(cases / LUNGS).convert(repository, out / LUNGS):
+        try:
+            told = diagnosed(pamrs.load_case(out / LUNGS / name), say)
+        except PamrsError as error:
+            refusal = str(error).partition(": are ")[0].rpartition("nothing was fitted: ")[2]
+            rows.append((name, f"refused: {refusal}", "-", "-", "-", "-"))
+            marks.append((name, lung_mark(name, None)))
+            continue
+        (out / f"{name}.json").write_text(json.dumps(told), encoding="utf-8")
+        rows.append(_row(name, told))
+        marks.append((name, lung_mark(name, told)))
+    return table(HEAD, rows), table(("recording", "known, and the mark"), marks)
 
 
 def shares_of_parameters(case: Case, told: dict[str, Any]) -> dict[str, float]:
@@ -264,6 +308,25 @@ def chamber_mark(name: str, told: dict[str, Any]) -> str:
     )
 
 
+def lung_mark(name: str, told: dict[str, Any] | None) -> str:
+    """What the authors wrote of a recording, and whether the answer, None if refused, agrees."""
+    known, right = KNOWN.get(name, ("nothing is wrong", ()))
+    if told is None:
+        return f"{known}: **cannot tell**, refused"
+    first = max(told["probabilities"], key=told["probabilities"].get, default="")
+    if told["verdict"] == "units":
+        first = told["misread"][0]["likely"]
+    if first in right or (not right and told["verdict"] in HEALTHY):
+        return f"{known}: **right**"
+    if first in PARTLY and set(right) & set(PARTLY):
+        return f"{known}: **partly**, the resistor by another name"
+    if told["laws"]:
+        return f"{known}: **wrong**, {told['laws'][0]['name']} is called another"
+    if first == "unlisted":
+        return f"{known}: **cannot tell**, something without a name"
+    return f"{known}: **wrong**, {first} is named first"
+
+
 # ---------------------------------------------------------------------------- page
 
 
@@ -346,6 +409,7 @@ def page(cases: Path, recordings: Path, out: Path, say: Say, units: Sequence[flo
         parts[unit] = shares_of_parameters(case, arms[unit])
     for key, told in [*chambers.items(), *((f"arm_{u:g}_bar", d) for u, d in arms.items())]:
         (out / f"{key}.json").write_text(json.dumps(told), encoding="utf-8")
+    lungs, lungs_known = lung_tables(cases, recordings / VENTILATOR, out, say)
     rubbing = cylinder_rows(zillen / "results_pneumatic-actuator" / "data" / "friction")
     known = [(name, chamber_mark(name, told)) for name, told in chambers.items()]
     return written(
@@ -355,6 +419,8 @@ def page(cases: Path, recordings: Path, out: Path, say: Say, units: Sequence[flo
         cylinders=table(("cylinder", *HEAD[1:4], "held-out error", "s"), rubbing),
         arms=table(("assumed unit", *HEAD[1:]), [_row(f"{u:g} bar", d) for u, d in arms.items()]),
         arm=arm_text(arms, parts),
+        lungs=lungs,
+        lungs_known=lungs_known,
     )
 
 

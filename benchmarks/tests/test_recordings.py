@@ -14,6 +14,8 @@ from benchmarks.recordings import (
     chamber_mark,
     cylinder_budget,
     cylinder_rows,
+    lung_mark,
+    lung_tables,
     page,
 )
 
@@ -33,6 +35,23 @@ def test_marks_of_chambers() -> None:
     assert "**cannot tell**" in chamber_mark("Aluminium", result("unlisted", "leak_muscle"))
     assert "**wrong**" in chamber_mark("Aluminium", result("effects", "leak_muscle"))
     assert len(set(CHAMBERS)) == 7
+
+
+def test_marks_of_the_lung(tmp_path: Path) -> None:
+    def told(first: str, *laws: str) -> dict:
+        found = [{"name": name} for name in laws]
+        return {"verdict": "unlisted", "probabilities": {first: 0.6, "none": 0.1}, "laws": found}
+
+    assert "**right**" in lung_mark("wrong_resistor", told("line.discharge_area"))
+    assert "**partly**" in lung_mark("wrong_resistor", told("line_flow_law"))
+    assert "**wrong**" in lung_mark("control_redo", told("line_flow_law"))
+    assert "**wrong**" in lung_mark("control_redo", told("unlisted", "chamber.gas"))
+    assert "**cannot tell**" in lung_mark("control_redo", told("unlisted"))
+    assert "**right**" in lung_mark("control_redo", {**told("none"), "verdict": "none"})
+    assert "**cannot tell**" in lung_mark("hose_off", None)
+    said: list[str] = []
+    assert "not there" in lung_tables(ROOT / "cases", tmp_path / "no", tmp_path, said.append)[0]
+    assert len(said) == 1
 
 
 def test_what_the_assumed_unit_changes_is_said() -> None:
