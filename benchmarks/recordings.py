@@ -52,7 +52,7 @@ KNOWN = {
     "missing_setting": ("10 cmH2O/(l/s) noted, Rp 20 used", ("line.discharge_area",)),
     "unit_new": ("kPa under a heading of cmH2O", ("kPa",)),
     "unit_old": ("kPa under a heading of cmH2O", ("kPa",)),
-    "hose_off": ("the hose is off from 3.4 to 13.5 s", ("leak_muscle",)),
+    "hose_off": ("the hose is off for a few breaths", ("leak_muscle",)),
     "obstruction": ("the resistor is shut for some seconds", ("tube_flow_restriction",)),
     "flow_drift": ("the zero of the flow meters", ("gauge_drift",)),
 }
