@@ -338,7 +338,28 @@ def _own(key: dict[str, Any]) -> tuple[str, ...]:
     return (words[sum(min(sizes) >= e for e in edges)],)
 
 
-def _tags(key: dict[str, Any]) -> dict[str, tuple[str, ...]]:
+def _distance(key: dict[str, Any], result: dict[str, Any] | None) -> float | None:
+    """How far the clearest effect of a case is from its nearest rival, by the limits of the result
+    [standard deviations]: in proportion to what it leaves; None without limits.
+    """
+    limits = {family(str(own["effect"])): own for own in (result or {}).get("limits") or []}
+    found = [
+        float(own["distance"]) * float(effect["reached"]) / float(own["left"])
+        for effect in key["effects"]
+        if (own := limits.get(str(effect["id"]))) and own["left"]
+    ]
+    return max(found, default=None)
+
+
+def _decade(distance: float | None) -> tuple[str, ...]:
+    """Stratum of a distance; none without one."""
+    if distance is None:
+        return ()
+    words = ("below 1", "1 to 2", "2 to 4", "4 to 8", "8 to 16", "above 16")
+    return (words[sum(distance >= edge for edge in (1.0, 2.0, 4.0, 8.0, 16.0))],)
+
+
+def _tags(key: dict[str, Any], result: dict[str, Any] | None) -> dict[str, tuple[str, ...]]:
     """The strata of a case."""
     spec, effects = key["spec"], key["effects"]
     lab, percent = spec["lab"], int(spec["percent"])
@@ -353,6 +374,7 @@ def _tags(key: dict[str, Any]) -> dict[str, tuple[str, ...]]:
         "strength": (_nearest(max(e["reached"] for e in effects)),) if effects else (),
         "effects": (str(len(effects)),) if effects else (),
         "own channel": _own(key),
+        "distance": _decade(_distance(key, result)),
         "placing": (("one block" if len(blocks) == 1 else "several blocks"),)
         if len(effects) > 1
         else (),
@@ -442,7 +464,7 @@ def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
     """Mark one case; a missing result is wrong wherever a question arises."""
     truth = opened(key)
     seen, above = _seen(key, truth)
-    tags = _tags(key)
+    tags = _tags(key, result)
     blank = {"verdict": "none", "seconds": None}
     told = _told(result or blank)
     names, wrong = truth.names, set(truth.wrong)

@@ -53,6 +53,7 @@ STRATA = (
     "truth",
     "strength",
     "own channel",
+    "distance",
     "effects",
     "placing",
     "model error",

@@ -15,6 +15,8 @@ from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
 SETTINGS = DiagnosisSettings()
+EXACT = DiagnosisSettings(usual_error=0.0)
+"""Settings for a model without an error of its own."""
 ROLES = ("fit", "fit", "held_out")
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pamrs.diagnosis.limits import counted
 from pamrs.diagnosis.next_experiment._choice import Outcome, outcome_of
-from pamrs.diagnosis.next_experiment._differences import counted
 from pamrs.diagnosis.prepare import (
     Block,
     Prepared,

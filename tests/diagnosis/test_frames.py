@@ -14,6 +14,7 @@ import pytest
 
 import pamrs
 from pamrs import cli
+from pamrs.diagnosis import limits
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment import measurable
 from pamrs.diagnosis.next_experiment._differences import _FORCE_NOISE
@@ -25,7 +26,7 @@ from pamrs.experiments._maker import _FILLING_TIME
 from pamrs.recordings import load_recording
 from pamrs.simulation import reading, replay
 from tests.diagnosis import frames
-from tests.diagnosis.asked import SETTINGS
+from tests.diagnosis.asked import EXACT, SETTINGS
 from tests.diagnosis.frames import BENCH, PAIR, REGULATED, REST, VALVED
 
 HOME = Path(__file__).parents[2]
@@ -204,9 +205,9 @@ def planned(monkeypatch: pytest.MonkeyPatch, rig: pamrs.Rig, *effects: str):
     kinds = {"slow_triangle", "slow_strokes", "strokes_at_speeds", "sealed_hold"}
     pool = library(rig, SETTINGS, sample_time=0.01, only=kinds)
     monkeypatch.setattr(plan, "library", lambda *_: pool)
-    monkeypatch.setattr(plan, "CATALOGUE", {name: EFFECTS[name] for name in effects})
+    monkeypatch.setattr(limits, "CATALOGUE", {name: EFFECTS[name] for name in effects})
     return lambda *kinds, channels=(), noise=None: pamrs.plan_diagnosis(
-        rig, channels or measurable(rig), experiments=kinds, noise=noise
+        rig, channels or measurable(rig), experiments=kinds, noise=noise, settings=EXACT
     )
 
 
@@ -230,8 +231,8 @@ def test_a_frame_with_a_valve_is_planned(monkeypatch: pytest.MonkeyPatch) -> Non
     made = planned(monkeypatch, VALVED, "leak_muscle", "muscle_hysteresis")
     found = made("sealed_hold", "slow_strokes")
     assert [b["name"] for b in found.blocks] == ["supply", "chamber", "force"]
-    assert found.sight("leak_muscle").block == "chamber"
-    assert found.sight("muscle_hysteresis").block == "force"
+    assert found.limit("leak_muscle").block == "chamber"
+    assert found.limit("muscle_hysteresis").block == "force"
     assert set(found.seen) == {"leak_muscle", "muscle_hysteresis"}
 
 
@@ -239,7 +240,7 @@ def test_the_packaged_layout_is_planned_from_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     some = ("muscle_hysteresis", "activation_pressure", "leak_muscle")
-    monkeypatch.setattr(plan, "CATALOGUE", {name: EFFECTS[name] for name in some})
+    monkeypatch.setattr(limits, "CATALOGUE", {name: EFFECTS[name] for name in some})
     layout, out = HOME / "cases" / "layouts" / "isometric_bench.toml", tmp_path / "plan.json"
     words = ["diagnose", "--plan", str(layout), "--force-noise", "2 N", "--json", str(out)]
     assert cli.main(words) == 0
@@ -248,6 +249,8 @@ def test_the_packaged_layout_is_planned_from_the_command_line(
     assert "What would add most" in page
     written = json.loads(out.read_text(encoding="utf-8"))
     assert written["noise"]["force"] == 2.0
-    verdicts = {e["id"]: e["verdict"] for e in written["effects"]}
-    assert verdicts["muscle_hysteresis"] == "seen"
+    limit = {e["id"]: e["seen_from"] for e in written["effects"]}
+    assert (
+        2.0 < limit["muscle_hysteresis"] < 50.0
+    )  # N: more than the noise, less than a tenth of the pull
     assert "leak_muscle" in written["not_asked"]  # the bench sets the pressure

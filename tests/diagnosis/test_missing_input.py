@@ -66,6 +66,24 @@ def test_a_leak_is_found_with_its_law() -> None:
     assert (std > 0.0).all()
 
 
+def test_what_lasts_for_a_while_is_found_at_its_time() -> None:
+    """Gas leaves a shut chamber between 14 and 20 s of one recording."""
+    time, rng = np.arange(0.0, 40.0, 0.02), np.random.default_rng(3)
+    lost = np.clip(time - 14.0, 0.0, 6.0)
+    runs = {
+        name: {"time": time, "muscle_pressure": 3e5 * fall + rng.normal(0.0, 200.0, time.size)}
+        for name, fall in (("kept", np.ones(time.size)), ("opened", np.exp(-lost / 30.0)))
+    }
+    found = pamrs.missing_input(pamrs.rigs.sealed_chamber(), runs)
+    (own,) = found.times
+    assert own.recording == "opened"
+    assert (own.start, own.stop) == pytest.approx((14.0, 20.0), abs=1.0)
+    assert own.ratio > 3.0
+    assert found.argument == "time"
+    assert " out of the chamber, " in found.sentence
+    assert f"s of opened: {own.ratio:.2g} times as much as at other times" in found.sentence
+
+
 def test_a_mass_hangs_in_the_input_of_its_load() -> None:
     """One kilogram more pulls a hanging load down by its weight, all the time."""
     heavier = LIFT.parameter("load.mass").value + 1.0

@@ -10,13 +10,15 @@ import pytest
 
 import pamrs
 from pamrs.cli import main
+from pamrs.diagnosis import limits
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment._differences import _UNSTATED_STD_SHARE, _free
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.experiments import commands_for, library, pressure_range
+from pamrs.findings import DETECTED, TOLD_APART
 from pamrs.simulation import core_rig
-from tests.diagnosis.asked import SETTINGS
+from tests.diagnosis.asked import EXACT, SETTINGS
 
 ALL = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 
@@ -60,7 +62,7 @@ def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str],
     assert written["schema"] == "pamrs.plan/1"
     assert written["noise"] == {"muscle_pressure": 100.0}
     verdicts = {e["id"]: e["verdict"] for e in written["effects"]}
-    assert verdicts["leak_muscle"] == "seen"
+    assert verdicts["leak_muscle"] != "not seen"
     assert "payload_swing" in written["not_asked"]  # there is no arm
     assert not verdicts.keys() & set(written["not_asked"])
     assert verdicts.keys() | set(written["not_asked"]) == set(CATALOGUE)
@@ -106,19 +108,20 @@ def few():
     tests are quick.
     """
     pool = library(pamrs.rigs.shoulder(), SETTINGS, sample_time=0.01, only=["slow_triangle"])
-    made = plan._parts
-    kept: dict[str, Any] = {}
+    made = plan._products
+    kept: dict[tuple[Any, ...], Any] = {}
 
-    def once(rig, blocks, experiment, *rest):
-        if experiment.name not in kept:
-            kept[experiment.name] = made(rig, blocks, experiment, *rest)
-        return kept[experiment.name]
+    def once(blocks, rig, name, *rest):
+        own = (*blocks, name)
+        if own not in kept:
+            kept[own] = made(blocks, rig, name, *rest)
+        return kept[own]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plan, "library", lambda *_: pool)
-        patch.setattr(plan, "_parts", once)
+        patch.setattr(plan, "_products", once)
         yield lambda *channels: pamrs.plan_diagnosis(
-            pamrs.rigs.shoulder(), channels, experiments=["slow_triangle"]
+            pamrs.rigs.shoulder(), channels, experiments=["slow_triangle"], settings=EXACT
         )
 
 
@@ -136,11 +139,13 @@ def test_all_channels_cut_three_blocks(whole: pamrs.Plan) -> None:
 
 
 def test_effects_show_in_their_own_block(whole: pamrs.Plan) -> None:
-    assert whole.sight("muscle_hysteresis").block == "arm"
-    assert whole.sight("valve_dead_zone").block in ("supply", "chamber")
-    assert whole.sight("valve_dead_zone").verdict == "seen"
-    smallest = whole.sight("muscle_hysteresis")
-    assert smallest.smallest == pytest.approx(smallest.typical * 3.0 / smallest.left)
+    assert whole.limit("muscle_hysteresis").block == "arm"
+    assert whole.limit("valve_dead_zone").block in ("supply", "chamber")
+    assert whole.limit("valve_dead_zone").verdict == "named"
+    own = whole.limit("muscle_hysteresis")
+    assert own.seen_from == pytest.approx(own.typical * DETECTED / own.seen)
+    assert own.named_from == pytest.approx(own.typical * TOLD_APART / own.distance)
+    assert own.named_from >= TOLD_APART / DETECTED * own.seen_from
 
 
 def test_without_the_angle_the_arm_is_not_isolable(few) -> None:
@@ -148,7 +153,7 @@ def test_without_the_angle_the_arm_is_not_isolable(few) -> None:
     assert "arm" not in [b["name"] for b in found.blocks]
     lost = {b["name"]: b["needs"] for b in found.missing}
     assert lost["arm"] == ["joint_angle"]
-    assert found.sight("muscle_hysteresis").verdict == "not seen"
+    assert found.limit("muscle_hysteresis").verdict == "not seen"
     assert found.additions[0].name == "joint_angle"
     assert "muscle_hysteresis" in found.additions[0].seen
     assert "not arm (muscle, joint and arm): without joint_angle" in found.text()
@@ -161,9 +166,11 @@ def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(
     (both,) = pool = library(rig, SETTINGS, sample_time=0.01, only=["holds_both_sides"])
     monkeypatch.setattr(plan, "library", lambda *_: pool)
     leaks = {name: EFFECTS[name] for name in ("leak_muscle", "valve_centre_leakage")}
-    monkeypatch.setattr(plan, "CATALOGUE", leaks)
+    monkeypatch.setattr(limits, "CATALOGUE", leaks)
     quiet = {"muscle_pressure": 20.0, "supply_pressure": 20.0, "joint_angle": 1e-4}
-    found = pamrs.plan_diagnosis(rig, ALL, experiments=["holds_both_sides"], noise=quiet)
+    found = pamrs.plan_diagnosis(
+        rig, ALL, experiments=["holds_both_sides"], noise=quiet, settings=EXACT
+    )
     assert found.separable("leak_muscle", "valve_centre_leakage")
     centre = rig.with_effect("valve_centre_leakage", {"conductance": 3e-10})
     leaking, still = both.simulate(centre), both.simulate(rig)

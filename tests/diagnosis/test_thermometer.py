@@ -294,7 +294,7 @@ def test_a_rig_that_states_the_lag_of_its_thermometer_can_be_planned(
     pool = library(rig, DiagnosisSettings())[:1]
     monkeypatch.setattr(_planning, "library", lambda *_: pool)
     plan = pamrs.plan_diagnosis(rig, ["muscle_pressure", "temperature"])
-    assert "thermometer_lag" not in {sight.effect for sight in plan.sights}
+    assert "thermometer_lag" not in {own.effect for own in plan.limits}
 
 
 def test_two_models_are_compared_where_only_one_has_a_temperature_of_its_gas() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pamrs
+from pamrs.diagnosis import limits
 from pamrs.diagnosis.fit import acts_in
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment._differences import _PRESSURE_NOISE
@@ -19,7 +20,7 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig
 from tests.diagnosis import slopes
-from tests.diagnosis.asked import SETTINGS, blocks_of, diagnosed
+from tests.diagnosis.asked import EXACT, SETTINGS, blocks_of, diagnosed
 from tests.diagnosis.noisy import driven
 
 RIG = load_rig(Path(__file__).parents[2] / "cases" / "layouts" / "eight_metres.toml")
@@ -112,8 +113,10 @@ def planned(monkeypatch: pytest.MonkeyPatch):
     (triangle,) = pool = library(RIG, SETTINGS, only=["slow_triangle"])
     monkeypatch.setattr(plan, "library", lambda *_: pool)
     names = ("leak_muscle", "valve_dead_zone", "valve_centre_leakage")
-    monkeypatch.setattr(plan, "CATALOGUE", {name: EFFECTS[name] for name in names})
-    return lambda *channels: pamrs.plan_diagnosis(RIG, channels, experiments=[triangle.name])
+    monkeypatch.setattr(limits, "CATALOGUE", {name: EFFECTS[name] for name in names})
+    return lambda *channels: pamrs.plan_diagnosis(
+        RIG, channels, experiments=[triangle.name], settings=EXACT
+    )
 
 
 def test_a_plan_knows_the_gauge_in_front_of_the_line(planned) -> None:
@@ -121,8 +124,8 @@ def test_a_plan_knows_the_gauge_in_front_of_the_line(planned) -> None:
     assert [block["name"] for block in whole.blocks] == ["supply", "line", "chamber"]
     assert whole.missing == []
     assert whole.noise["line_pressure"] == _PRESSURE_NOISE
-    assert whole.sight("valve_dead_zone").verdict == "seen"
-    assert whole.sight("leak_muscle").block == "chamber"
+    assert whole.limit("valve_dead_zone").verdict != "not seen"
+    assert whole.limit("leak_muscle").block == "chamber"
     chamber = whole.blocks[-1]
     assert "through the line" in chamber["why"]
     assert "no pressure is measured between" not in whole.text()
@@ -146,8 +149,8 @@ def test_a_plan_takes_each_block_as_its_channels_drive_it(planned) -> None:
     few = planned("line_pressure", "muscle_pressure")
     (chamber,) = few.blocks
     assert chamber["drives"] == ["line_pressure"]
-    assert few.sight("valve_dead_zone").verdict == "not seen"
-    assert few.sight("valve_dead_zone").left == 0.0
+    assert few.limit("valve_dead_zone").verdict == "not seen"
+    assert few.limit("valve_dead_zone").left == 0.0
     # what is lost makes a pressure drop along the hose, and does not add up (decision 0003)
-    lost = few.sight("leak_muscle").left
-    assert 0.0 < lost < 0.5 * planned(*CHANNELS).sight("leak_muscle").left
+    lost = few.limit("leak_muscle").left
+    assert 0.0 < lost < 0.5 * planned(*CHANNELS).limit("leak_muscle").left

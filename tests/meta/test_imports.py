@@ -43,7 +43,16 @@ LAYERS = (
 )
 #: The same inside the diagnosis: its steps, then the result, what is said of it, and who runs it.
 STEPS = ("settings", "prepare", "fit", "noise", "missing", "screen", "evidence", "search", "model")
-STEPS_OF_A_DIAGNOSIS = (*STEPS, "ready", "next_experiment", "result", "laws", "explain", "")
+STEPS_OF_A_DIAGNOSIS = (
+    *STEPS,
+    "ready",
+    "limits",
+    "next_experiment",
+    "result",
+    "laws",
+    "explain",
+    "",
+)
 #: Names that a module may take from the root package, which loads all others on first use.
 FROM_ROOT = {"_core", "__version__"}
 

@@ -20,17 +20,17 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1108,
-    "cli": 1376,
+    "cli": 1380,
     "control": 4622,
     "design": 532,
-    "diagnosis": 10901,
+    "diagnosis": 11029,
     "effects": 408,
     "experiments": 1060,
-    "findings": 913,
+    "findings": 946,
     "fit": 2965,
     "library": 71,
     "recordings": 4882,
-    "report": 2044,
+    "report": 2066,
     "rig": 2238,
     "rigs": 139,
     "simulation": 1095,
@@ -39,15 +39,15 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 26650,
+    "tests": 26674,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
-    "trial": 5358,
+    "trial": 5369,
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35834
+MOST = 36021
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

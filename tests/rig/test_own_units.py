@@ -12,9 +12,10 @@ import pytest
 
 from pamrs import cli, rigs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.next_experiment._plan import Plan, Sight
+from pamrs.diagnosis.next_experiment._plan import Plan
 from pamrs.errors import ParameterError
 from pamrs.experiments import library
+from pamrs.findings import Limit
 from pamrs.rig import Units, parse_rig
 from pamrs.simulation import core_rig
 from tests.rig.cases import refused
@@ -130,8 +131,8 @@ def test_a_refusal_of_the_core_is_in_the_unit_of_the_file(old: str, new: str, sa
 
 
 def test_a_plan_gives_sizes_in_the_units_of_the_file() -> None:
-    sights = [
-        Sight(name, 9.0, "chamber", "run", f"{name}.{size}", typical, typical, "seen")
+    limits = [
+        Limit(name, block="chamber", size=f"{name}.{size}", typical=typical, seen_from=typical)
         for name, size, typical in (
             ("activation_pressure", "threshold", 1e4),
             ("payload_change", "mass_change", 2.0),
@@ -139,9 +140,9 @@ def test_a_plan_gives_sizes_in_the_units_of_the_file() -> None:
         )
     ]
     units = Units({"a": "psi", "b": "lb", "c": "l/(s bar)"})
-    plan = Plan("rig", (), {}, [BLOCK], [], [], sights, [], [], units=units)
+    plan = Plan("rig", (), {}, [BLOCK], [], [], limits, [], [], units=units)
     table = plan.text()
-    for size in (r"1\.45 +1\.5  psi", r"4\.41 +4\.4  lb", r"0\.001 +0\.001  l/\(s bar\)"):
+    for size in (r"1\.5 psi +1\.5 psi", r"4\.4 lb +4\.4 lb", r"0\.001 l/\(s bar\) +0\.001"):
         assert re.search(size, table)
 
 

@@ -23,7 +23,7 @@ from pamrs.cli._shared import (
 )
 
 if TYPE_CHECKING:
-    from pamrs.diagnosis import Diagnosis
+    from pamrs.diagnosis import Diagnosis, DiagnosisSettings
     from pamrs.findings import Protocol
     from pamrs.recordings import Case
 
@@ -119,14 +119,12 @@ def diagnose_command(
     if plan is not None:
         if case is not None or rig is not None:
             raise typer.BadParameter("give a case (with or without --rig) or --plan, not both")
-        if consider or perfect_model:
-            raise typer.BadParameter(
-                "--consider and --perfect-model need a case: --plan has no recordings to judge"
-            )
+        if consider:
+            raise typer.BadParameter("--consider needs a case: --plan has no recordings to judge")
         if any(path is not None for path in (report, pdf, png, model, experiment)):
             raise typer.BadParameter("--plan writes text and --json only")
         noise = {"pressure": pressure_noise, "angle": angle_noise, "force": force_noise}
-        _plan(plan, channels, noise, json)
+        _plan(plan, channels, noise, json, perfect_model=perfect_model)
         return
     if case is None:
         raise typer.BadParameter(
@@ -143,9 +141,9 @@ def diagnose_command(
         from pamrs.rig import load_rig
 
         loaded = loaded.with_rig(load_rig(rig), rig)
-    from pamrs.diagnosis import DiagnosisSettings, diagnose
+    from pamrs.diagnosis import diagnose
 
-    settings = DiagnosisSettings(usual_error=0.0) if perfect_model else None
+    settings = _settings(perfect_model=perfect_model)
     with progress(f"diagnosing {loaded.name}") as say:
         result = diagnose(loaded, settings=settings, consider=consider or (), progress=say)
     protocol = result.next_experiment.protocol
@@ -208,8 +206,20 @@ def _model_text(result: Diagnosis, case: Case, file: Path) -> str:
     return result.rig.with_case(Path(folder).as_posix()).to_toml_text()
 
 
+def _settings(*, perfect_model: bool) -> DiagnosisSettings | None:
+    """Settings for a model that is exact; None for the usual ones."""
+    from pamrs.diagnosis import DiagnosisSettings
+
+    return DiagnosisSettings(usual_error=0.0) if perfect_model else None
+
+
 def _plan(
-    rig: Path, channels: str | None, noises: dict[str, str | None], json: Path | None
+    rig: Path,
+    channels: str | None,
+    noises: dict[str, str | None],
+    json: Path | None,
+    *,
+    perfect_model: bool,
 ) -> None:
     """What a diagnosis could tell, to standard output and a file; noise by its dimension."""
     from json import dumps
@@ -229,5 +239,11 @@ def _plan(
         else [name.strip() for name in channels.split(",") if name.strip()]
     )
     with progress(f"planning for {loaded.name}") as say:
-        result = plan_diagnosis(loaded, given, noise=noise, progress=say)
+        result = plan_diagnosis(
+            loaded,
+            given,
+            noise=noise,
+            settings=_settings(perfect_model=perfect_model),
+            progress=say,
+        )
     write({json: dumps(result.to_dict(), indent=2) + "\n"}, result.text())

@@ -28,8 +28,9 @@ from pamrs._progress import Steps
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.evidence import BlockGroup
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
-from pamrs.diagnosis.fit import Problem, Unfollowed, fits, with_offsets
+from pamrs.diagnosis.fit import Problem, Unfollowed, fits, free_baseline, with_offsets
 from pamrs.diagnosis.laws import is_better, promising_laws, under
+from pamrs.diagnosis.limits import limits_of
 from pamrs.diagnosis.missing import missing_input_of, worst_block
 from pamrs.diagnosis.model import Conclusion, conclude
 from pamrs.diagnosis.next_experiment import next_to_record
@@ -58,7 +59,7 @@ from pamrs.diagnosis.search import examine, find_misread, reading_errors
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
-from pamrs.findings import MOST_MISSED, Answer, MissingInput, NextExperiment
+from pamrs.findings import MOST_MISSED, Answer, Limit, MissingInput, NextExperiment, beyond
 from pamrs.recordings import Case, Recording, is_table, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig, regulators_of
@@ -352,9 +353,19 @@ def _physics(
     missing = inner.losses.part(
         "the missing input", lambda: _missing(diagnosis.answer, found, inner, outer)
     )
-    warnings = [*slack, *diagnosis.warnings]
+    where = diagnosis.where
+    if missing is not None and missing.times:
+        first = missing.times[0].recording
+        spans = [[t.start, t.stop] for t in missing.times if t.recording == first]
+        where = replace(where, recording=first, intervals=sorted(spans))
+    limits = inner.losses.part("the limits", lambda: _limits(found, inner, outer), [])
     diagnosis = replace(
-        diagnosis, missing_input=missing, next_experiment=proposal, warnings=warnings
+        diagnosis,
+        where=where,
+        missing_input=missing,
+        limits=limits,
+        next_experiment=proposal,
+        warnings=[*slack, *diagnosis.warnings],
     )
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
@@ -407,6 +418,20 @@ def _missing(
     )
     followed = missing is not None and missing.share > 0.0 and missing.noises_after < MOST_MISSED
     return missing.thinned(_MOST_POINTS) if missing is not None and followed else None
+
+
+def _limits(found: Conclusion, inner: Problem, outer: Problem) -> list[Limit]:
+    """From which sizes on the recordings would have shown effects and told them apart."""
+    every = replace(inner, recordings=[p for part in _by_role(inner, outer).values() for p in part])
+    baseline, errors = found.models.baseline, found.own_errors
+    left = {
+        b.name: beyond(
+            found.table[b.channel].after, found.table[b.channel].noise, errors[b.channel]
+        )
+        for b in inner.blocks
+        if b.channel in found.table
+    }
+    return limits_of(every, baseline, list(free_baseline(every, baseline)), found.noise_level, left)
 
 
 def _by_role(inner: Problem, outer: Problem) -> dict[str, list[Prepared]]:

@@ -98,6 +98,10 @@ class Diagnosis(View, Findings):
         ``unit``, ``units``, and for each of ``recordings`` ``time``, ``value``, ``std``,
         ``arguments``, with ``law`` what a named effect takes of it; at most 400 points of each.
         None where nothing is missing, or it could not be followed.
+    limits : list of Limit
+        What the recordings could have shown, one entry for each effect that the rig can have:
+        ``effect``, ``block``, ``recording``, ``seen`` and ``distance`` from ``rival`` at the
+        ``typical`` value of ``size`` [standard deviations], ``seen_from`` and ``named_from``, SI.
     next_experiment : NextExperiment
         ``text``, ``excitation``, ``expected_information_bits``, ``pairs`` (what tells each two
         hypotheses that are left open apart: ``between``, ``text``, ``experiment``, ``noises``),

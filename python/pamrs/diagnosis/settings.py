@@ -338,14 +338,6 @@ class DiagnosisSettings:
         "judgement: a proportional regulator of 100 l/min fills 0.3 l by 5 bar/s",
         least=_TINY,
     )
-    # what could be seen, before there are data
-    seen: float = _setting(
-        3.0,
-        "noise levels",
-        "signature left, of the noise of a bin of 0.1 s, from which an effect is seen",
-        "judgement",
-        least=_TINY,
-    )
     seed: int = _setting(
         20140501,
         "1",

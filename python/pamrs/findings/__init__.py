@@ -29,10 +29,13 @@ from pamrs.findings._answer import (
 )
 from pamrs.findings._compare import Compared, compare_results
 from pamrs.findings._details import (
+    DETECTED,
+    TOLD_APART,
     BlockResidual,
     Considered,
     Curves,
     Form,
+    Limit,
     NextExperiment,
     PairExperiment,
     Protocol,
@@ -68,9 +71,10 @@ from pamrs.findings._entries import (
 )
 from pamrs.findings._entry import Entry, fields_from, to_plain
 from pamrs.findings._findings import Findings, ModelFile, Trace
-from pamrs.findings._missing import MissingInput, MissingRecording, shown_unit
+from pamrs.findings._missing import MissingInput, MissingRecording, MissingTime, shown_unit
 
 __all__ = [
+    "DETECTED",
     "HEALTHY",
     "MENDED",
     "MOST_MISSED",
@@ -78,6 +82,7 @@ __all__ = [
     "NOT_JUDGED",
     "REFITTED",
     "SETTLED",
+    "TOLD_APART",
     "VERDICTS",
     "YOURS",
     "Answer",
@@ -99,12 +104,14 @@ __all__ = [
     "FitErrors",
     "FreeRun",
     "FreeRunError",
+    "Limit",
     "MismatchSize",
     "MismatchStages",
     "Misread",
     "Missed",
     "MissingInput",
     "MissingRecording",
+    "MissingTime",
     "ModelFile",
     "NextExperiment",
     "OtherLaw",

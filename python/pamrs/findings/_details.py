@@ -4,6 +4,7 @@ tried.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,6 +13,57 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.findings._entry import NOT_WRITTEN, Entry
+
+DETECTED = 3.86
+"""Signature left [standard deviations] that is detected in 90 %, with 1 % of false alarms."""
+TOLD_APART = 4.0
+"""Distance of two effects [standard deviations] from which one is told from the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limit(Entry):
+    """Sizes from which some recordings show an effect, and from which they can name it.
+
+    Attributes
+    ----------
+    effect : str
+        Its id, with a place where it may act at one of several blocks: ``leak_muscle@flexor``.
+    left : float
+        Signature at the typical size after parameters took what they can inside their tolerances,
+        root mean square in the recording where that is largest [noise levels].
+    block, recording : str
+        Where; empty when it acts in no block that the channels surround.
+    seen, distance : float
+        Signature at the typical size after the error of the model took what it can as well, and
+        after its nearest rival did at any size [standard deviations].
+    rival : str
+        That rival: another effect, or a parameter of the rig file by its dotted name.
+    size : str
+        Dotted name of the parameter that scales the effect; empty where no number does.
+    typical, seen_from, named_from : float
+        A typical value of that parameter, the one from which the effect is detected (in 90 %, with
+        1 % of false alarms), and the one from which it is named, as it is four standard deviations
+        from its rival; of a restriction's conductance the largest ones [SI]; NaN without one.
+    """
+
+    effect: str
+    left: float = 0.0
+    block: str = ""
+    recording: str = ""
+    seen: float = 0.0
+    distance: float = 0.0
+    rival: str = ""
+    size: str = ""
+    typical: float = math.nan
+    seen_from: float = math.nan
+    named_from: float = math.nan
+
+    @property
+    def verdict(self) -> str:
+        """``named``, ``seen`` or ``not seen`` at the typical size."""
+        if self.distance >= TOLD_APART:
+            return "named"
+        return "seen" if self.seen >= DETECTED else "not seen"
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from pamrs.findings._answer import REFITTED, SETTLED, Answer, answer_of
 from pamrs.findings._details import (
     BlockResidual,
     Considered,
+    Limit,
     NextExperiment,
     RecordingUsed,
     Tested,
@@ -164,6 +165,8 @@ class Findings:
     missing_input : MissingInput or None
         What the model of the block that the answer is about would need to follow the recordings;
         None where nothing is missing, or it could not be followed.
+    limits : list of Limit
+        Of each effect the sizes from which the recordings show it, and from which they can name it.
     next_experiment : NextExperiment
         What to record next.
     data : list of RecordingUsed
@@ -217,6 +220,7 @@ class Findings:
     parameters: dict[str, ParameterFound] = field(default_factory=dict)
     fit: FitErrors = field(default_factory=FitErrors)
     missing_input: MissingInput | None = None
+    limits: list[Limit] = field(default_factory=list)
     next_experiment: NextExperiment = field(default_factory=NextExperiment)
     data: list[RecordingUsed] = field(default_factory=list)
     considered: list[Considered] = field(default_factory=list)

@@ -63,21 +63,44 @@ class MissingRecording(Entry):
         """An argument at each value (n,); the time by its name."""
         return self.time if argument == "time" else self.arguments[argument]
 
-    def thinned(self, most: int) -> MissingRecording:
-        """Thin it to so many points at most, of six digits."""
-        every = slice(None, None, max(1, -(-self.time.size // most)))
+    def at(self, rows: Any, digits: int = 17) -> MissingRecording:
+        """Some of its points, with so many digits."""
 
-        def few(values: Array) -> Array:
-            return np.array([float(f"{v:.6g}") for v in values[every]])
+        def some(values: Array) -> Array:
+            return np.array([float(f"{v:.{digits}g}") for v in values[rows]])
 
         return replace(
             self,
-            time=few(self.time),
-            value=few(self.value),
-            std=few(self.std),
-            arguments={n: few(v) for n, v in self.arguments.items()},
-            law=None if self.law is None else few(self.law),
+            time=some(self.time),
+            value=some(self.value),
+            std=some(self.std),
+            arguments={n: some(v) for n, v in self.arguments.items()},
+            law=None if self.law is None else some(self.law),
         )
+
+    def thinned(self, most: int) -> MissingRecording:
+        """Thin it to so many points at most, of six digits."""
+        return self.at(slice(None, None, max(1, -(-self.time.size // most))), 6)
+
+
+@dataclass(frozen=True, eq=False)
+class MissingTime(Entry):
+    """A time at which a missing input is much larger than at others.
+
+    Attributes
+    ----------
+    recording : str
+        The recording.
+    start, stop : float
+        [s].
+    ratio : float
+        Its root mean square there over that everywhere else.
+    """
+
+    recording: str
+    start: float
+    stop: float
+    ratio: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,6 +134,9 @@ class MissingInput(View, Entry):
         SI unit of each argument.
     recordings : list of MissingRecording
         The input in each recording.
+    times : list of MissingTime
+        Times between which it is much larger than elsewhere, where nothing that was measured
+        explains it; the clearest first.
     """
 
     block: str
@@ -125,6 +151,7 @@ class MissingInput(View, Entry):
     rate: str
     units: dict[str, str]
     recordings: list[MissingRecording]
+    times: list[MissingTime] = field(default_factory=list)
 
     def __repr__(self) -> str:
         return f"MissingInput({self.block!r}: {self.sentence})"

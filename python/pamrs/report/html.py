@@ -269,6 +269,19 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
     return rows
 
 
+def _limits(diagnosis: Findings) -> list[tuple[str, ...]]:
+    """From which sizes on the recordings would have shown effects, and told them apart."""
+    return [
+        (
+            words.label(own.effect),
+            words.spoken_name(own.block),
+            *words.limit_sizes(own)[1:],
+            words.set_label([own.rival]) if own.rival else "",
+        )
+        for own in diagnosis.limits
+    ]
+
+
 def _curves(panels: list[figures.Panel], prefix: str) -> Markup | None:
     return Markup(figures.curves(panels, prefix)) if panels else None  # noqa: S704
 
@@ -408,6 +421,7 @@ _TABLES: Final[dict[str, Callable[[Findings], list[Any]]]] = {
     "found": _found,
     "budget": _budget,
     "intervals": _intervals,
+    "limits": _limits,
     "free_run": _free_run,
     "fits": _fits,
     "parameters": _parameters,

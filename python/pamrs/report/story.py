@@ -254,12 +254,10 @@ def bench_value(effect: EffectFound, *, own_units: bool = False) -> list[tuple[s
 def _on_bench(effect: EffectFound, name: str, own: EffectParameterFound) -> str:
     info = EFFECTS.get(effect.id)
     bench = info.on_bench(name, effect.form) if info else None
-    if bench is None:
-        unit, factor = words.display_unit(own.unit, abs(own.value))
-    else:
-        mixed = effect.parameters.get(bench.mixed_by)
-        part = float(mixed.value) if mixed else 0.0
-        unit, factor = bench.unit, bench.factor + (bench.mixed - bench.factor) * part
+    mixed = effect.parameters.get(bench.mixed_by) if bench else None
+    unit, factor = words.bench_unit(
+        f"{effect.id}.{name}", own.unit, abs(own.value), effect.form, mixed.value if mixed else 0.0
+    )
     value = words.format_number(own.value * factor, 2)
     bounds = words.span95(own)
     low, high = (words.format_number(v * factor, 2) for v in bounds or (own.value, own.value))

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, TypeGuard
 
 from pamrs.channels import unit_of
-from pamrs.effects import EFFECTS, Hypothesis, Term, effect_of
+from pamrs.effects import EFFECTS, Hypothesis, Term, effect_of, find_parameter
 from pamrs.findings import (
     HEALTHY,
     MENDED,
@@ -24,6 +24,7 @@ from pamrs.findings import (
     EffectFound,
     EffectParameterFound,
     Findings,
+    Limit,
     OtherLaw,
     PairExperiment,
     Part,
@@ -31,8 +32,9 @@ from pamrs.findings import (
     WrongParameter,
     left_of,
 )
+from pamrs.rig import Units
 from pamrs.rig.schema import BLOCKS
-from pamrs.units import with_unit
+from pamrs.units import from_si, with_unit
 
 _LABELS = {
     "none": "nothing missing",
@@ -134,6 +136,50 @@ def display_unit(unit: str, magnitude: float) -> tuple[str, float]:
         if not math.isfinite(magnitude) or abs(magnitude) >= least:
             return name, factor
     return unit, 1.0
+
+
+def bench_unit(
+    parameter: str, unit: str, magnitude: float, form: str = "", part: float = 0.0
+) -> tuple[str, float]:
+    """Unit in which a bench has a parameter of an effect, and the factor from SI.
+
+    Parameters
+    ----------
+    parameter : str
+        Dotted name.
+    unit : str
+        SI unit.
+    magnitude : float
+        Typical absolute value in SI.
+    form : str, optional
+        Form of the effect; its first one by default.
+    part : float, optional
+        Value of the parameter that mixes two units.
+    """
+    effect, name = parameter.rpartition(".")[::2]
+    info = EFFECTS.get(Term.parse(effect).id)
+    bench = info.on_bench(name, form) if info else None
+    if bench is None:
+        return display_unit(unit, magnitude)
+    return bench.unit, bench.factor + (bench.mixed - bench.factor) * part
+
+
+def limit_sizes(limit: Limit, units: Units | None = None) -> list[str]:
+    """Typical size of an effect and those from which it is seen and told apart, in the units of a
+    bench or those of a rig file; empty where there is none.
+    """
+    si = find_parameter(limit.size).unit if limit.size else "1"
+    found = []
+    for size in (limit.typical, limit.seen_from, limit.named_from):
+        if not is_number(size):
+            found.append("")
+        elif units is None:
+            unit, factor = bench_unit(limit.size, si, size)
+            found.append(with_unit(format_number(factor * size, 2), unit))
+        else:
+            unit = units.usual(si)
+            found.append(with_unit(f"{from_si(size, unit, si, difference=True):.2g}", unit))
+    return found
 
 
 def shown_errors(

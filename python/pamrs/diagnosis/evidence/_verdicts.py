@@ -219,11 +219,10 @@ def _odds_shared(
 def _same_values(term: Term, candidates: Sequence[Candidate]) -> bool:
     """Whether hypotheses give one term the same values, as far as each knows them."""
 
-    def same(parameter: str, one: Candidate, two: Candidate) -> bool:
-        first, second = one.fit.values[parameter], two.fit.values[parameter]
-        spread = math.hypot(*(c.fit.std.get(parameter, math.inf) for c in (one, two)))
-        known = _ALIKE_STDS * spread, _ALIKE_SHARE * max(abs(first), abs(second))
-        return abs(first - second) <= max(known)
+    def same(parameter: str, *both: Candidate) -> bool:
+        first, second = (c.fit.values[parameter] for c in both)
+        stds = (c.fit.std.get(parameter, math.inf) for c in both)
+        return are_alike(first, second, math.hypot(*stds))
 
     return all(
         same(parameter, one, two)
@@ -231,6 +230,12 @@ def _same_values(term: Term, candidates: Sequence[Candidate]) -> bool:
         for parameter in one.fit.values.keys() & two.fit.values.keys()
         if parameter == term.id or effect_of(parameter) == term
     )
+
+
+def are_alike(first: float, second: float, std: float) -> bool:
+    """True where two values of one name may be the same, with the deviation of their difference."""
+    known = _ALIKE_STDS * std, _ALIKE_SHARE * max(abs(first), abs(second))
+    return abs(first - second) <= max(known)
 
 
 def _possible_together(terms: Sequence[Term]) -> bool:

@@ -4,15 +4,16 @@ stretches of time that they were not fitted to; and the sentence that says it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import channel_of
-from pamrs.findings import MissingInput, MissingRecording, shown_unit
-from pamrs.report.text import format_number, spoken_name
+from pamrs.findings import MissingInput, MissingRecording, MissingTime, shown_unit
+from pamrs.report.text import format_number, listed, spoken_name
 
 _HATS = 8  # of a smooth function of one argument
 _FOLDS = 4  # of stretches of time: each is told from the others
@@ -24,6 +25,14 @@ _TURN = 0.02  # of the fastest rate, below which a motion has no direction
 _TREND = 0.8  # correlation from which a size grows or falls with an argument
 _ONE_SIGN_SHARE = 0.8  # mean over mean size from which an input has one direction
 _OTHER_SIZE = 1.3  # ratio of sizes from which they are not the same
+_EDGES = 100  # of the times in a recording at which an input may begin and end
+_MUCH_LARGER = 3.0  # ratio of root mean squares from which it is there at some times alone
+_LEAST_OF_SQUARE = 0.1  # share of its square in such a time
+_MOST_OF_TIME = 0.6  # share of a recording up to which that is told
+# share of the square that an argument leaves at least beside such times, and by so many times more
+# than there is at all others
+_LEFT_BESIDE_TIMES, _MORE_THAN_OTHER_TIMES = 0.2, 5.0
+_MOST_TIMES = 5  # of an input in all recordings
 _FASTER = 1.4  # the same of the fastest third of a motion and the middle one
 
 Array = NDArray[np.float64]
@@ -119,8 +128,57 @@ def _candidates(along: _Along, position: str, rate: str) -> dict[str, Array]:
     return found | {"time": np.hstack(time)}
 
 
-def explained(found: MissingInput) -> tuple[str, float, str]:
-    """Tell what a missing input depends on most.
+def times_of(recordings: Sequence[MissingRecording]) -> list[MissingTime]:
+    """Times between which a missing input is much larger than at all others, the clearest first:
+    edges under which its squares in and outside of them are the most probable ones of two normal
+    distributions.
+    """
+    free = [np.ones(own.time.size, dtype=bool) for own in recordings]
+    found = list[MissingTime]()
+    while len(found) < _MOST_TIMES:
+        best = max(
+            (_clearest(k, recordings, free) for k in range(len(recordings))), key=lambda own: own[0]
+        )
+        if best[0] <= 0.0:
+            break
+        found.append(best[1])
+        k = [own.recording for own in recordings].index(best[1].recording)
+        free[k] &= (recordings[k].time < best[1].start) | (recordings[k].time > best[1].stop)
+    return found
+
+
+def _clearest(
+    k: int, recordings: Sequence[MissingRecording], free: Sequence[NDArray[np.bool_]]
+) -> tuple[float, MissingTime]:
+    """Times in one recording between which the input differs most from what it is elsewhere, with
+    the gain in log likelihood; none where it is not much larger there.
+    """
+    own = recordings[k]
+    power = np.concatenate([[0.0], np.cumsum(np.where(free[k], own.value**2, 0.0))])
+    count = np.concatenate([[0.0], np.cumsum(free[k])])
+    parts = [r.value[f] ** 2 for r, f in zip(recordings, free, strict=True)]
+    all_power = math.fsum(float(np.sum(part)) for part in parts)
+    all_count = float(sum(part.size for part in parts))
+    edges = np.unique(np.linspace(0, own.time.size, _EDGES + 1).astype(int))
+    a, b = (edges[i] for i in np.triu_indices(edges.size, 1))
+    inside, within = power[b] - power[a], count[b] - count[a]
+    least = 1e-12 * all_power + 1e-300
+    whole = math.fsum(float(np.sum(r.value**2)) for r in recordings)
+    high = (inside + least) / np.maximum(within, 1.0)
+    low = (all_power - inside + least) / np.maximum(all_count - within, 1.0)
+    gain = all_count * np.log((all_power + least) / all_count)
+    gain = gain - within * np.log(high) - (all_count - within) * np.log(low)
+    clear = (high > _MUCH_LARGER**2 * low) & (b - a < _MOST_OF_TIME * own.time.size)
+    clear &= (within == b - a) & (inside > _LEAST_OF_SQUARE * whole)
+    gain = np.where(clear, gain, 0.0)
+    best = int(np.argmax(gain))
+    start, stop = float(own.time[a[best]]), float(own.time[b[best] - 1])
+    ratio = math.sqrt(float(high[best] / low[best]))
+    return float(gain[best]), MissingTime(own.recording, start, stop, ratio)
+
+
+def with_words(found: MissingInput) -> MissingInput:
+    """Tell what a missing input depends on, and when it acts where that is at some times alone.
 
     Parameters
     ----------
@@ -129,12 +187,38 @@ def explained(found: MissingInput) -> tuple[str, float, str]:
 
     Returns
     -------
-    argument : str
-        Name of the argument; ``time`` for a steady one, empty where no single one explains it.
-    share : float
-        Share of the input's square that a function of it tells, cross-validated (0 to 1).
-    sentence : str
-        In words.
+    MissingInput
+        With ``argument``, ``explained``, ``sentence`` and ``times``.
+    """
+    argument, share, sentence = _explained(found)
+    times = times_of(found.recordings)
+    inside = [part for own in found.recordings for part in _during(own, times)]
+    whole, there = (
+        math.fsum(float(np.sum(own.value**2)) for own in part)
+        for part in (found.recordings, inside)
+    )
+    least = max(_LEFT_BESIDE_TIMES, _MORE_THAN_OTHER_TIMES * (1.0 - there / whole))
+    if not times or 1.0 - share < least:
+        return replace(found, argument=argument, explained=share, sentence=sentence)
+    _, _, sentence = _explained(replace(found, recordings=inside))
+    spans = [f"from {t.start:.1f} to {t.stop:.1f} s of {t.recording}" for t in times]
+    ratio = format_number(times[0].ratio, 2)
+    sentence += f", {listed(spans)}: {ratio} times as much as at other times"
+    return replace(found, argument="time", explained=there / whole, sentence=sentence, times=times)
+
+
+def _during(own: MissingRecording, times: Sequence[MissingTime]) -> list[MissingRecording]:
+    """The parts of a recording between some times."""
+    return [
+        own.at((own.time >= t.start) & (own.time <= t.stop))
+        for t in times
+        if t.recording == own.recording
+    ]
+
+
+def _explained(found: MissingInput) -> tuple[str, float, str]:
+    """Argument that tells most of an input (``time`` for a steady one, empty where no single one
+    does), the share of its square that a function of it tells, cross-validated, and a sentence.
     """
     along = _Along.of(found.recordings, [*found.units])
     candidates = _candidates(along, found.position, found.rate)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from pamrs import _core
 from pamrs.channels import block_of, channel_of, dotted, rate_of, unit_of
 from pamrs.diagnosis.fit import Key, Problem
-from pamrs.diagnosis.missing._dependence import explained
+from pamrs.diagnosis.missing._dependence import with_words
 from pamrs.diagnosis.missing._reconstruct import (
     INPUT_UNITS,
     Array,
@@ -153,10 +152,7 @@ def _told(
         units,
         told,
     )
-    if not above:
-        return found
-    argument, explains, sentence = explained(found)
-    return replace(found, argument=argument, explained=explains, sentence=sentence)
+    return with_words(found) if above else found
 
 
 def _moving(told: Collection[MissingRecording]) -> list[str]:

@@ -212,10 +212,10 @@ def _judged(
         logged = logged.between(stop=float(logged.time[_OFF_SAMPLES]))
         part = f"whether it is off was asked of its first {logged.duration:.4g} s"
         note = f"{note}; {part}" if note else part
-    left = _left(prepared, logged, final, known)
     # drives bring noise into a block, and so into what its channel's error is compared with
-    noises = {n: prepared.noise[recorded_as(n)] / (run.channels[n].noise or 1.0) for n in doubtful}
-    off = {n for n in doubtful if left.get(n, math.inf) * noises[n] > _OFF_NOISES}
+    levels = {recorded_as(n): own for n in doubtful if (own := run.channels[n].noise)}
+    left = _left(prepared, logged, final, known, prepared.noise | levels)
+    off = {n for n in doubtful if left.get(n, math.inf) > _OFF_NOISES}
     far = {recorded_as(name) for name in off}
     drives = {b.channel: far.intersection(b.drives) for b in blocks if b.mechanical}
     for name in list(off):
@@ -234,7 +234,11 @@ def _is_ahead(rig: Rig, seconds: float) -> bool:
 
 
 def _left(
-    prepared: Prepared, logged: Recording, final: Rig, known: KnownValues
+    prepared: Prepared,
+    logged: Recording,
+    final: Rig,
+    known: KnownValues,
+    noise: Mapping[str, float],
 ) -> dict[str, float]:
     """What a free run misses of each channel [noise levels], at the least, where the values of the
     rig are as far from what is known of them as is likely, its commands come up to a sample earlier
@@ -251,7 +255,7 @@ def _left(
         warm = zip(begun.items(), moved[count + 1 :].tolist(), strict=True)
         begins = {name: there.kelvin + there.unsure * away for (name, there), away in warm}
         there = with_known(final, values)
-        return _misses(there, late, begins, compared, prepared.noise, _OFF_ROWS)
+        return _misses(there, late, begins, compared, noise, _OFF_ROWS)
 
     at, least = np.zeros(count + 1 + len(begun)), dict[str, float]()
     with contextlib.suppress(PamrsError, ArithmeticError):  # a model that leaves its range

@@ -21,11 +21,11 @@ from pamrs._arrays import Array
 from pamrs._losses import Losses
 from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, acts_in, bin_width, two_at_a_time
+from pamrs.diagnosis.limits import counted
 from pamrs.diagnosis.next_experiment._differences import (
     Left,
     Linear,
     checked_channels,
-    counted,
     difference,
     elsewhere,
     judged_alike,

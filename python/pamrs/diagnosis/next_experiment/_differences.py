@@ -19,6 +19,7 @@ import numpy as np
 from pamrs._arrays import Array, solve_normal
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, bin_width, free_baseline, residuals
+from pamrs.diagnosis.limits import counted
 from pamrs.diagnosis.noise import bins_of, noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
@@ -201,14 +202,6 @@ def judged_alike(problems: Sequence[Problem]) -> list[Problem]:
         replace(problem, recordings=[replace(p, unsettled=latest) for p in problem.recordings])
         for problem in problems
     ]
-
-
-def counted(prepared: Prepared, block: Block, settings: DiagnosisSettings) -> float:
-    """Independent samples that a recording counts as in a block: fewer where its beginning is not
-    judged.
-    """
-    dropped = min(prepared.n, prepared.unsettled.get(block.channel, 0))
-    return settings.effective_samples * (1.0 - dropped / prepared.n)
 
 
 @dataclass(frozen=True, eq=False)

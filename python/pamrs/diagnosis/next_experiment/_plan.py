@@ -2,47 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from dataclasses import dataclass, field
 from typing import Any
 
-from pamrs.effects import CATALOGUE, Term, find_parameter
+from pamrs.effects import CATALOGUE, Term
 from pamrs.errors import ParameterError
+from pamrs.findings import Limit, to_plain
+from pamrs.report.text import limit_sizes
 from pamrs.rig import Units
-from pamrs.units import from_si
-
-
-@dataclass(frozen=True)
-class Sight:
-    """How an effect would show.
-
-    Attributes
-    ----------
-    effect : str
-        Its id, with a place where it may act at one of several blocks: ``leak_muscle@flexor``.
-    left : float
-        What is left of its signature, root mean square over the recording where that is largest
-        [noise levels].
-    block, recording : str
-        Where; empty when it acts in no block that the channels surround.
-    size : str
-        Dotted name of the parameter that scales it; empty where no number does.
-    typical, smallest : float
-        Typical value of that parameter and the smallest one (of a restriction's conductance, the
-        largest) that leaves three noise levels [SI]; NaN without one.
-    verdict : str
-        ``seen``, ``marginal`` or ``not seen`` at the typical size.
-    """
-
-    effect: str
-    left: float
-    block: str = ""
-    recording: str = ""
-    size: str = ""
-    typical: float = math.nan
-    smallest: float = math.nan
-    verdict: str = "not seen"
 
 
 @dataclass(frozen=True)
@@ -88,11 +56,12 @@ class Plan:
         Blocks that would be there with more channels: ``name``, ``covers``, ``needs``.
     experiments : list of dict
         ``name``, ``text``, ``duration`` [s] of those assumed.
-    sights : list of Sight
+    limits : list of Limit
         One for each effect that the rig can have, in the order of the catalogue; one for each place
         of an effect that may act at one of several blocks.
     pairs : list of (str, str, float)
-        Effects seen that are not told apart, with the cosine of their signatures.
+        Effects seen at their typical sizes that are not told apart there, with the cosine of their
+        signatures.
     groups : list of tuple of str
         The same, joined.
     additions : list of Addition
@@ -107,7 +76,7 @@ class Plan:
     blocks: list[dict[str, Any]]
     missing: list[dict[str, Any]]
     experiments: list[dict[str, Any]]
-    sights: list[Sight]
+    limits: list[Limit]
     pairs: list[tuple[str, str, float]]
     groups: list[tuple[str, ...]]
     additions: list[Addition] = field(default_factory=list)
@@ -116,10 +85,10 @@ class Plan:
     @property
     def seen(self) -> tuple[str, ...]:
         """Effects that would be seen at their typical size."""
-        return tuple(s.effect for s in self.sights if s.verdict == "seen")
+        return tuple(own.effect for own in self.limits if own.verdict != "not seen")
 
-    def sight(self, effect: str) -> Sight:
-        """How one effect would show.
+    def limit(self, effect: str) -> Limit:
+        """From which size on one effect would be seen, and told from its nearest rival.
 
         Parameters
         ----------
@@ -128,19 +97,19 @@ class Plan:
 
         Returns
         -------
-        Sight
-            What is left of it after what the baseline can do.
+        Limit
+            Sizes in SI, and its signature at the typical one.
 
         Raises
         ------
         ParameterError
             If the plan does not have it.
         """
-        found = next((s for s in self.sights if s.effect == effect), None)
+        found = next((own for own in self.limits if own.effect == effect), None)
         if found is None:
             raise ParameterError(
                 f"effect = {effect!r} is not allowed: one of "
-                f"{', '.join(s.effect for s in self.sights)}"
+                f"{', '.join(own.effect for own in self.limits)}"
             )
         return found
 
@@ -158,7 +127,7 @@ class Plan:
         -------
         bool
         """
-        both = {self.sight(first).effect, self.sight(second).effect}
+        both = {self.limit(first).effect, self.limit(second).effect}
         return both <= set(self.seen) and not any({a, b} == both for a, b, _ in self.pairs)
 
     @property
@@ -167,15 +136,11 @@ class Plan:
         surround.
         """
         return tuple(
-            e for e in CATALOGUE if e not in {Term.parse(sight.effect).id for sight in self.sights}
+            e for e in CATALOGUE if e not in {Term.parse(own.effect).id for own in self.limits}
         )
 
     def to_dict(self) -> dict[str, Any]:
         """The plan as plain values, null for no number."""
-
-        def number(value: float) -> float | None:
-            return value if math.isfinite(value) else None
-
         return {
             "schema": "pamrs.plan/1",
             "rig": self.rig,
@@ -185,18 +150,9 @@ class Plan:
             "missing": self.missing,
             "experiments": self.experiments,
             "effects": [
-                {
-                    "id": Term.parse(s.effect).id,
-                    "at": Term.parse(s.effect).at or None,
-                    "verdict": s.verdict,
-                    "left": number(s.left),
-                    "block": s.block or None,
-                    "recording": s.recording or None,
-                    "size": s.size or None,
-                    "typical": number(s.typical),
-                    "smallest": number(s.smallest),
-                }
-                for s in self.sights
+                {"id": term.id, "at": term.at or None, "verdict": own.verdict, **to_plain(own)}
+                for own in self.limits
+                for term in [Term.parse(own.effect)]
             ],
             "not_asked": list(self.not_asked),
             "pairs": [{"effects": [a, b], "cosine": round(c, 4)} for a, b, c in self.pairs],
@@ -259,43 +215,30 @@ class Plan:
         lines = [
             "",
             (
-                "Effects of a small but usual size, after the baseline has moved inside its "
-                "tolerances (in noise levels of means over 0.1 s)"
+                "Sizes from which effects would be seen, and from which they would be named, after "
+                "parameters inside their tolerances and the error of the model took what they can"
             ),
         ]
-        # names of places make the columns wider
-        wide = max([25, *(len(s.effect) + 1 for s in self.sights)])
-        room = max([9, *(len(s.block) + 1 for s in self.sights)])
-        long = max([17, *(len(s.recording) + 1 for s in self.sights)])
+        head = (
+            "effect",
+            "",
+            "in",
+            "recording",
+            "at size",
+            "seen from",
+            "named from",
+            "most like it",
+        )
+        rows: list[tuple[str, ...]] = [head]
+        for own in self.limits:
+            nearest = own.rival if own.block else "(nothing here shows it)"
+            where = own.block or "-", own.recording or "-"
+            rows.append((own.effect, own.verdict, *where, *limit_sizes(own, self.units), nearest))
+        wide = [max(len(row[k]) for row in rows) + 2 for k in range(len(head))]
         lines += [
-            f"  {'effect':<{wide}}{'':<9}{'remains':>8}  "
-            f"{'in':<{room}}{'recording':<{long}}{'at size':>10}{'seen from':>11}  {'unit':<13}"
-            "cannot be told from"
+            "  " + "".join(f"{cell:<{w}}" for cell, w in zip(row, wide, strict=True)).rstrip()
+            for row in rows
         ]
-        for sight in self.sights:
-            rivals = [
-                b if a == sight.effect else a for a, b, _ in self.pairs if sight.effect in (a, b)
-            ]
-            si = find_parameter(sight.size).unit if sight.size else "1"
-            unit = self.units.usual(si)
-            typical, smallest = (
-                f"{from_si(size, unit, si, difference=True):.{digits}g}"
-                if math.isfinite(size)
-                else ""
-                for size, digits in ((sight.typical, 3), (sight.smallest, 2))
-            )
-            unit = "" if unit == "1" else unit
-            where = f"{sight.block or '-':<{room}}{sight.recording or '-':<{long}}"
-            if sight.verdict == "not seen":
-                rivals += [
-                    "the parameters inside their tolerances, or noise"
-                    if sight.block
-                    else "(nothing here shows it)"
-                ]
-            lines.append(
-                f"  {sight.effect:<{wide}}{sight.verdict:<9}{sight.left:>8.2g}  {where}"
-                f"{typical:>10}{smallest:>11}  {unit:<13}{', '.join(rivals)}".rstrip()
-            )
         return [
             *lines,
             *(
@@ -336,7 +279,7 @@ class Plan:
 
     def __repr__(self) -> str:
         return (
-            f"Plan({self.rig}: {len(self.blocks)} blocks, {len(self.seen)} of {len(self.sights)} "
+            f"Plan({self.rig}: {len(self.blocks)} blocks, {len(self.seen)} of {len(self.limits)} "
             f"effects seen, {len(self.groups)} groups not told apart)"
         )
 

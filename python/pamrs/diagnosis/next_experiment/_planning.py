@@ -1,17 +1,9 @@
 """Before any data: which blocks some channels tell apart, which effects they show, and which they
-cannot tell from each other.
-
-The rig is simulated under a few standard experiments. Each effect of the catalogue, at a typical
-size, changes the residuals of the cut chain by a signature; what the baseline can do inside its
-tolerances, and the starts of the windows, are taken off it. What is left, in units of the noise,
-says whether the effect would be seen, and the angle between what is left of two effects whether one
-would be taken for the other (Ding, Model-Based Fault Diagnosis Techniques, 2013, isolability by
-projected signatures).
+cannot tell from each other: the limits of a few standard experiments, which are simulated.
 """
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,53 +12,32 @@ from typing import Any
 
 import numpy as np
 
-from pamrs._arrays import Array, solve_normal
 from pamrs._progress import Steps
-from pamrs.diagnosis.fit import (
-    FIT_BIN_TIME,
-    Key,
-    Problem,
-    Start,
-    acts_in,
-    bin_width,
-    changes,
-    fits,
-    free_baseline,
-    known_parameters,
-    places_of,
-    residuals,
-    starts_of,
-)
+from pamrs.diagnosis.fit import Problem, Start, free_baseline
+from pamrs.diagnosis.limits import Limits, Products, possible_starts, products_of
 from pamrs.diagnosis.next_experiment._differences import (
-    bins_of_fit,
     checked_channels,
     measurable,
     noise_of,
     taken,
     usual_noise,
-    weights_of,
 )
-from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
+from pamrs.diagnosis.next_experiment._plan import Addition, Plan
 from pamrs.diagnosis.next_experiment._words import words
-from pamrs.diagnosis.prepare import Block, available_blocks, begun_alike, binned
+from pamrs.diagnosis.noise import model_error, noise_levels
+from pamrs.diagnosis.prepare import Block, Prepared, available_blocks, begun_alike
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import CATALOGUE, EFFECTS, Term
-from pamrs.errors import DiagnosisError, ParameterError, RigError, SimulationError
+from pamrs.effects import EFFECTS
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments import Experiment, library
+from pamrs.findings import DETECTED, TOLD_APART, Limit
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
-from pamrs.simulation import core_rig
+from pamrs.simulation import Simulation, core_rig
 
-# [noise levels] from which an arm, which scatters most, is suspect (decision 14)
-_SUSPECT_FROM = math.sqrt(0.45)
-# cosine of two signatures from which their effects are one (isolability as in Ding (2013))
-_SAME_COSINE = 0.95
-# [noise levels] what must be left of an effect when another one explains all that it can
-_TOLD_APART = 1.0
-_MOST_MULTIPLE = 1e4  # [typical sizes] largest size of an effect that is worth telling
-# halvings of a size until a rig can have it: below a hundredth it is another effect
-_MOST_HALVINGS = 8
+# realisations of the drives' noise for an experiment's noise level: a fifth is enough
+_REPLICATES = 4
 
 
 BASIC = (
@@ -81,37 +52,16 @@ BASIC = (
     "slow_strokes",
 )
 """Kinds of experiments that a plan assumes by default, those of them that the rig can do."""
-_Place = tuple[Block, str]
-"""A block, and the name of an experiment."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """What one block over one experiment says: products of baseline sensitivities and signatures,
-    which add up.
-
-    Attributes
-    ----------
-    baseline : (k, k) array
-        Of the baseline's sensitivities.
-    mixed : (k, m) array
-        Of these with the signatures.
-    signatures : (m, m) array
-        Of the signatures.
-    """
-
-    baseline: Array
-    mixed: Array
-    signatures: Array
 
 
 @dataclass(frozen=True, eq=False)
 class _Picture:
-    """What a choice of blocks and experiments shows: of each effect, and between every two."""
+    """Limits by a choice of blocks and experiments, and the effects not told apart, with the cosine
+    of their signatures.
+    """
 
-    sights: dict[str, Sight]
-    cosine: dict[tuple[str, str], float]
-    unseparated: frozenset[tuple[str, str]]
+    limits: dict[str, Limit]
+    unseparated: dict[tuple[str, str], float]
     bits: float
 
 
@@ -164,8 +114,8 @@ def plan_diagnosis(
     --------
     >>> import pamrs
     >>> plan = pamrs.plan_diagnosis(pamrs.rigs.sealed_chamber(), ["muscle_pressure"])
-    >>> plan.sight("leak_muscle").verdict
-    'seen'
+    >>> plan.limit("leak_muscle").verdict
+    'named'
     """
     _check_rig(rig)
     settings = DiagnosisSettings() if settings is None else settings
@@ -175,28 +125,28 @@ def plan_diagnosis(
     whole = available_blocks(rig, every)
     pool = {e.name: e for e in library(rig, settings)}
     chosen = _chosen(rig, pool, experiments)
-    starts = _starts(rig, whole, _MOST_HALVINGS)
-    parts: dict[_Place, _Part] = {}
+    starts = possible_starts(rig, whole)
     layers = _layers(rig, own, every)
     together = [block for _, blocks in layers for block in blocks]
-    free = free_baseline(Problem(together, [], core_rig(rig), settings), rig)
-    usable, tell = {}, Steps(progress)
-    for done, (name, experiment) in enumerate(pool.items()):
+    free = list(free_baseline(Problem(together, [], core_rig(rig), settings), rig))
+    runs = {name: (e.changed(rig), e.simulate(rig)) for name, e in pool.items()}
+    products: Products = {}
+    usable, tell = dict(pool), Steps(progress)
+    recorded = [(cut, _recorded(cut, runs, sound, channels, settings)) for channels, cut in layers]
+    for done, name in enumerate(pool):
         tell(name, done / len(pool))
         try:
-            for measured, cut in layers:
-                heard = {c: v for c, v in sound.items() if c in measured}
-                parts |= _parts(rig, cut, experiment, starts, heard, settings, free)
+            for cut, prepared in recorded:
+                found = _products(cut, runs[name][0], name, prepared, starts, free, settings)
+                products = {**products, **found}
         except SimulationError:
-            continue  # the cut chain leaves the range of the model there
-        usable[name] = experiment
+            del usable[name]  # the cut chain leaves the range of the model there
     chosen = [name for name in chosen if name in usable]
     blocks = available_blocks(rig, own)
-    assumed = _Assumed(rig, parts, starts, settings)
+    assumed = _Assumed(rig, products, starts, free, settings)
     now = assumed.picture(blocks, chosen)
-    order = list(now.sights)
-    unseparated = sorted(now.unseparated, key=lambda p: (order.index(p[0]), order.index(p[1])))
-    pairs = [(a, b, now.cosine[a, b]) for a, b in unseparated]
+    order = list(now.limits)
+    pairs = [(a, b, cosine) for (a, b), cosine in now.unseparated.items()]
     return Plan(
         rig=rig.name,
         channels=own,
@@ -210,7 +160,7 @@ def plan_diagnosis(
         experiments=[
             {"name": n, "text": usable[n].text, "duration": usable[n].duration} for n in chosen
         ],
-        sights=[now.sights[e] for e in order],
+        limits=list(now.limits.values()),
         pairs=pairs,
         groups=_joined([(a, b) for a, b, _ in pairs], order),
         additions=assumed.additions(own, every, chosen, usable),
@@ -225,8 +175,9 @@ class _Assumed:
     """
 
     rig: Rig
-    parts: dict[_Place, _Part]
+    products: Products
     starts: list[Start]
+    baseline: list[str]
     settings: DiagnosisSettings
 
     def blocks(self, channels: tuple[str, ...]) -> list[Block]:
@@ -234,65 +185,21 @@ class _Assumed:
         return available_blocks(self.rig, checked_channels(self.rig, channels))
 
     def picture(self, blocks: list[Block], experiments: Sequence[str]) -> _Picture:
-        """What some blocks over some experiments show."""
-        used: dict[Key, _Part] = {
-            (block.name, name): part
-            for (block, name), part in self.parts.items()
+        """Limits by some blocks over some experiments."""
+        used = {
+            (block, name): values
+            for (block, name), values in self.products.items()
             if block in blocks and name in experiments
         }
-        effects = list(dict.fromkeys(str(s.effect) for s in self.starts))
-        if not used:
-            return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
-        shares = [(p.baseline, p.mixed, p.signatures) for p in used.values()]
-        total = _Part(*(np.asarray(sum(share)) for share in zip(*shares, strict=True)))
-        freed = solve_normal(total.baseline + np.eye(len(total.baseline)), total.mixed)
-        gram = total.signatures - total.mixed.T @ freed
-        sizes = {
-            key: np.sqrt(
-                np.clip(
-                    np.diag(p.signatures)
-                    - 2.0 * np.einsum("km,km->m", p.mixed, freed)
-                    + np.einsum("km,kl,lm->m", freed, p.baseline, freed),
-                    0.0,
-                    None,
-                )
-                / self.settings.effective_samples
-            )
-            for key, p in used.items()
+        found = Limits(used, self.starts, self.baseline, self.settings)
+        shown = [e for e, limit in found.each.items() if limit.seen >= DETECTED]
+        unseparated = {
+            (a, b): found.cosine(a, b)
+            for a, b in itertools.combinations(shown, 2)
+            if found.apart(a, b) < TOLD_APART
         }
-        power = np.sqrt(np.clip(np.diag(gram), 1e-12, None))
-        cosines = np.abs(gram) / np.outer(power, power)
-        shapes = {e: [k for k, s in enumerate(self.starts) if str(s.effect) == e] for e in effects}
-        sights: dict[str, Sight] = {}
-        best: dict[str, int] = {}
-        for effect in effects:
-            index, key = max(
-                ((k, key) for k in shapes[effect] for key in sizes),
-                key=lambda pair: float(sizes[pair[1]][pair[0]]),
-            )
-            best[effect] = index
-            sights[effect] = _sight(
-                self.starts[index], float(sizes[key][index]), key, self.settings
-            )
-        cosine, unseparated = {}, set()
-        for first, second in itertools.combinations(effects, 2):
-            mine, theirs = best[first], best[second]
-            forward = float(max(cosines[mine, k] for k in shapes[second]))
-            backward = float(max(cosines[theirs, k] for k in shapes[first]))
-            cosine[first, second] = min(1.0, max(forward, backward))
-            left = min(
-                sights[first].left * math.sqrt(max(0.0, 1.0 - forward**2)),
-                sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2)),
-            )
-            seen = min(sights[first].left, sights[second].left) >= self.settings.seen
-            alike = cosine[first, second] > _SAME_COSINE or left < _TOLD_APART
-            if seen and alike:
-                unseparated.add((first, second))
-        chosen = [best[e] for e in effects]
-        _, logarithm = np.linalg.slogdet(np.eye(len(chosen)) + gram[np.ix_(chosen, chosen)])
-        return _Picture(
-            sights, cosine, frozenset(unseparated), 0.5 * float(logarithm) / math.log(2.0)
-        )
+        _, logarithm = np.linalg.slogdet(np.eye(len(found.together)) + found.together)
+        return _Picture(found.each, unseparated, 0.5 * float(logarithm) / math.log(2.0))
 
     def needed(self, block: str, own: tuple[str, ...], every: tuple[str, ...]) -> list[str]:
         """The fewest channels that, added to those at hand, surround a block."""
@@ -379,46 +286,6 @@ def _chosen(
     return list(dict.fromkeys(found))
 
 
-def _starts(rig: Rig, blocks: list[Block], most_halvings: int) -> list[Start]:
-    """Every start of every effect that a rig can have; where some blocks tell apart at which place
-    it acts, of the effect at each of them.
-    """
-    found: list[Start] = []
-    for effect in CATALOGUE:
-        if not _applies(rig, effect, blocks):
-            continue
-        places = places_of(rig, effect, blocks)
-        for term in [Term(effect, at) for at in places] or [Term(effect)]:
-            usual = starts_of(term, sealed=rig.model["valve"] is None)
-            found += [
-                s
-                for s in (_possible(rig, start, most_halvings) for start in usual)
-                if s is not None
-            ]
-    return found
-
-
-def _possible(rig: Rig, start: Start, most_halvings: int) -> Start | None:
-    """A start of an effect, halved until a rig can have it (a small arm does not carry as much
-    payload as an effect takes away); None where it never can.
-    """
-    for halvings in range(most_halvings):
-        smaller = start.scaled(0.5**halvings) if halvings else start
-        with contextlib.suppress(ParameterError, RigError, SimulationError):
-            core_rig(smaller.applied(rig))
-            return smaller
-    return None
-
-
-def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
-    """Whether a rig has what an effect acts on but not the effect, and a block of the cut chain in
-    which it could show.
-    """
-    if effect in {held["id"] for held in rig.effects}:
-        return False
-    return fits(rig, effect) and any(acts_in(Term(effect), block) for block in blocks)
-
-
 def _layers(
     rig: Rig, own: tuple[str, ...], every: tuple[str, ...]
 ) -> list[tuple[tuple[str, ...], list[Block]]]:
@@ -456,74 +323,43 @@ def _described(rig: Rig, block: Block, blocks: list[Block]) -> dict[str, Any]:
     }
 
 
-def _parts(
-    rig: Rig,
+def _recorded(
     blocks: list[Block],
-    experiment: Experiment,
-    starts: list[Start],
+    runs: Mapping[str, tuple[Rig, Simulation]],
     noise: Mapping[str, float],
+    channels: tuple[str, ...],
     settings: DiagnosisSettings,
-    baseline: list[str],
-) -> dict[_Place, _Part]:
-    """Products of everything that one experiment shows, by block."""
-    stands = experiment.changed(rig)
-    prepared = taken(experiment.simulate(rig), stands, experiment.name, noise, settings)
-    prepared = begun_alike(blocks, core_rig(stands), prepared)
-    problem = Problem(blocks, [prepared], core_rig(stands), settings)
-    base = residuals(problem, stands, baseline)
-    weights = weights_of(problem, stands)
-    known = known_parameters(stands)
-    spread = np.array([known[name].tol for name in baseline])
-    width = bin_width(prepared, FIT_BIN_TIME)
-    scale, slopes, moved = {}, {}, {}
-    for block in blocks:
-        key = (block.name, experiment.name)
-        slope, scale[key] = bins_of_fit(problem, prepared, block, base[key], weights)
-        slopes[key] = slope * spread * scale[key]
-        moved[key] = np.zeros((slope.shape[0], len(starts)))
-    for index, start in enumerate(starts):
-        acting = [b for b in blocks if acts_in(start.effect, b)]
-        try:
-            found = changes(
-                replace(problem, blocks=acting), start.applied(stands), base, start.effect
-            )
-        except SimulationError:
-            continue  # this size leaves the range in which the model holds
-        for block in acting:
-            key = (block.name, experiment.name)
-            mean, _ = binned(found[key].value - base[key].value, base[key].rows, width)
-            moved[key][:, index] = mean * scale[key]
-    products: dict[_Place, _Part] = {}
-    for block in blocks:
-        slope, change = (part[block.name, experiment.name] for part in (slopes, moved))
-        products[block, experiment.name] = _Part(
-            slope.T @ slope, slope.T @ change, change.T @ change
-        )
-    return products
+) -> dict[str, Prepared]:
+    """Experiments as recordings of some channels, ready for the cut chain."""
+    heard = {c: v for c, v in noise.items() if c in channels}
+    return {
+        name: begun_alike(blocks, core_rig(rig), taken(run, rig, name, heard, settings))
+        for name, (rig, run) in runs.items()
+    }
 
 
-def _sight(start: Start, left: float, key: Key, settings: DiagnosisSettings) -> Sight:
-    """How an effect shows from the start that shows most."""
-    if left < 1e-6:
-        return Sight(str(start.effect), 0.0)
-    marginal = left >= _SUSPECT_FROM
-    verdict = "seen" if left >= settings.seen else "marginal" if marginal else "not seen"
-    if not start.scalable:
-        return Sight(str(start.effect), left, *key, verdict=verdict)
-    leading = start.sizes[0]
-    typical, size = abs(start.free[leading]), settings.seen / left
-    found = start.scaled(size).free[leading]
-    # one that its bounds hold shows less than that
-    whole = math.isclose(start.scaled(0.999 * size).free[leading], found, rel_tol=1e-9)
-    smallest = abs(found) if size < _MOST_MULTIPLE and not whole else math.nan
-    return Sight(str(start.effect), left, *key, leading, typical, smallest, verdict)
+def _products(
+    blocks: list[Block],
+    rig: Rig,
+    name: str,
+    recorded: Mapping[str, Prepared],
+    starts: Sequence[Start],
+    baseline: Sequence[str],
+    settings: DiagnosisSettings,
+) -> Products:
+    """Products of all that one experiment shows; the model's error runs over what all visit."""
+    few = replace(settings, noise_replicates=_REPLICATES)
+    problem = Problem(blocks, [recorded[name]], core_rig(rig), few)
+    stated = model_error(rig, settings.usual_error)
+    level = noise_levels(problem, problem.core, stated, visited=list(recorded.values()))
+    return products_of(problem, rig, starts, baseline, level)
 
 
 def _addition(kind: str, name: str, text: str, now: _Picture, then: _Picture) -> Addition:
     seen = tuple(
-        e for e, s in then.sights.items() if s.verdict == "seen" and now.sights[e].verdict != "seen"
+        e for e, limit in then.limits.items() if limit.seen >= DETECTED > now.limits[e].seen
     )
-    separated = tuple(sorted(now.unseparated - then.unseparated))
+    separated = tuple(sorted(now.unseparated.keys() - then.unseparated.keys()))
     return Addition(kind, name, text, seen, separated, then.bits - now.bits)
 
 

@@ -134,7 +134,10 @@ def bins_of(prepared: Prepared) -> int:
 
 
 def noise_levels(
-    problem: Problem, core: _core.Rig, stated: Stated | None = None
+    problem: Problem,
+    core: _core.Rig,
+    stated: Stated | None = None,
+    visited: list[Prepared] | None = None,
 ) -> dict[Key, NoiseLevel]:
     """Noise levels of all blocks and recordings, the drives' noise carried through the model by
     simulation.
@@ -148,10 +151,14 @@ def noise_levels(
     stated : dict, optional
         The model's error as the rig file states it (:attr:`pamrs.Rig.model_error`): excess inside
         it is none.
+    visited : list of Prepared, optional
+        Recordings whose ranges the curves of that error run over; those of the problem by default.
     """
     found: dict[Key, NoiseLevel] = {}
     settings, known = problem.settings, stated or {}
-    ranges = {b.name: operating_ranges(b, problem.recordings) for b in problem.blocks if known}
+    ranges = {
+        b.name: operating_ranges(b, visited or problem.recordings) for b in problem.blocks if known
+    }
     for prepared in problem.recordings:
         seed = [settings.seed, crc32(prepared.recording.name.encode())]
         rng, white_noise = np.random.default_rng(seed), np.random.default_rng([*seed, 1])

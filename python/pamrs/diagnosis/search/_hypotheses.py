@@ -20,6 +20,7 @@ from pamrs.diagnosis.evidence import (
     BlockGroup,
     Candidate,
     Weighing,
+    are_alike,
     explains,
     is_absent,
     misses_only_held_out,
@@ -115,7 +116,6 @@ _LEAST_GAIN_SHARE = 0.08  # share of the largest gain from which an effect is fi
 # share of an effect's best gain from which another of its starts is fitted (decision 13)
 _NEAR_START = 0.6
 _NEAR_FORM = 0.3  # share of the best gain that fits another form: strong effects are not linear
-_ALIKE_STDS = 3.0  # standard deviations within which two blocks give an effect the same values
 _MOST_FORMS = 4  # forms of an effect that are fitted
 _EFFECTS_WITH_STARTS = 3  # effects of which more than one start is fitted (decision 13)
 _REFITTED = 0.3  # share of the work on some blocks that their refit is
@@ -175,11 +175,12 @@ def examine(
         others = [p for p in begun if isinstance(p, Mismatch) and p is not part]
         # where only noise is left nothing parts the names that are open elsewhere
         sure = others if isinstance(part, Mismatch) else [p for p in others if p.is_settled]
-        starts = [start for p in sure for start in p.leading]
+        own = part.refit.trial.suspects if isinstance(part, Mismatch) else part.group.blocks
+        starts = [s for p in sure for s in p.leading if any(acts_in(s.effect, b) for b in own)]
         names = " and ".join(b.name for b in part.refit.trial.inner.blocks)
         beside = losses.part(
             f"what other blocks name, tried in {names},",
-            lambda: part.with_effects_of_others(starts),
+            lambda: part.with_effects_of_others(starts) if starts else part,
             part,
             through=through,
         )
@@ -555,16 +556,13 @@ class Mismatch:
         leads here.
         """
         trial, start = self.refit.trial, self.candidates[0]
-        acting = [s for s in starts if any(acts_in(s.effect, b) for b in trial.suspects)]
-        if not acting:
-            return self
         self.search.tell(
-            f"trying {', '.join(str(s.effect) for s in acting)}, which other blocks have"
+            f"trying {', '.join(str(s.effect) for s in starts)}, which other blocks have"
         )
         named = [c for c in self.candidates if c.effects and c.fit.events is None]
         best = max(named, key=lambda c: _probability(self.weighed, c), default=None)
         found: list[Candidate] = []
-        for one in acting:
+        for one in starts:
             alone = trial.fit_effects([one], start.fit, trial.white)
             if alone is None or not _is_visible(alone, one):
                 continue  # a clock that is late by the same for all that a block sees
@@ -621,13 +619,14 @@ class OnlyNoise:
             return self  # one fit of all recordings: no hypothesis is compared with it
         found = []
         for start in starts:
-            if not any(acts_in(start.effect, b) for b in trial.suspects):
-                continue
             # held first: what the baseline hid it by has to let go of it
             known = replace(start, free={}, held=start.held | start.free)
             first = trial.fit_effects([known], baseline.fit, trial.white)
             both = first and trial.fit_effects([start], first.fit, trial.white)
-            found += [both] if both and _is_visible(both, start) and _is_alike(both, start) else []
+            if both and _is_visible(both, start):
+                own = both.fit
+                alike = (are_alike(own.values[n], v, own.std[n]) for n, v in start.free.items())
+                found += [both] if all(alike) else []
         # what is there once is paid for once: the odds of both places are given for both
         prices = dict.fromkeys(_best_of_each(found), math.log(SHARED_ODDS))
         return replace(self, group=weigh_only_noise(self.group, prices))
@@ -715,15 +714,6 @@ def _nearly_as_heavy(
 def _is_visible(candidate: Candidate, start: Start) -> bool:
     """Whether recordings depend on any parameter of an effect that was fitted."""
     return any(math.isfinite(candidate.fit.std[name]) for name in start.free)
-
-
-def _is_alike(candidate: Candidate, start: Start) -> bool:
-    """Whether an effect kept the values from which it was fitted, as far as they are known."""
-    found = candidate.fit
-    return all(
-        abs(found.values[name] - value) <= max(_ALIKE_STDS * found.std[name], 0.5 * abs(value))
-        for name, value in start.free.items()
-    )
 
 
 def _weigh_to_the_end(

@@ -1,0 +1,338 @@
+"""Limits: sizes from which recordings show an effect, and from which they tell it from what else
+it could be.
+
+An effect at a typical size changes the residuals of the cut chain by a signature. Parameters
+inside their tolerances and the error of the model may take what they can of it; what is left, in
+units of the noise, says from which size on the effect is detected, and what of it is left
+beside another signature of any size, from which size on it is told from that one (Eriksson, Frisk &
+Krysander, A method for quantitative fault diagnosability analysis of stochastic linear descriptor
+models, Automatica 49, 2013: distinguishability; the error of the model counts as noise here).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pamrs._arrays import Array, solve_normal
+from pamrs.diagnosis.fit import (
+    Key,
+    Problem,
+    Start,
+    acts_in,
+    changes,
+    fits,
+    known_parameters,
+    places_of,
+    residuals,
+    starts_of,
+)
+from pamrs.diagnosis.noise import NoiseLevel, bins_of
+from pamrs.diagnosis.prepare import Block, Prepared, binned
+from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.effects import CATALOGUE, Term
+from pamrs.errors import ParameterError, RigError, SimulationError
+from pamrs.findings import DETECTED, TOLD_APART, Limit
+from pamrs.rig import Rig
+from pamrs.simulation import core_rig
+
+__all__ = ["Limits", "Products", "counted", "limits_of", "possible_starts", "products_of"]
+
+_NOTHING = 1e-6  # [noise levels] signature below which rounding is all there is
+_MOST_MULTIPLE = 1e4  # [typical sizes] largest size of an effect that is worth telling
+# halvings of a size until a rig can have it: below a hundredth it is another effect
+_MOST_HALVINGS = 8
+
+Products = Mapping[tuple[Block, str], Array]
+"""Products of all columns of a block in a recording with each other: curves of the model's error,
+baseline parameters by one tolerance, signatures.
+"""
+
+
+def possible_starts(rig: Rig, blocks: Sequence[Block]) -> list[Start]:
+    """Every start of every effect that a rig can have and does not have; where some blocks tell
+    apart at which place it acts, of the effect at each of them.
+    """
+    found: list[Start] = []
+    own = {held["id"] for held in rig.effects}
+    for effect in CATALOGUE:
+        acting = any(acts_in(Term(effect), block) for block in blocks)
+        if effect in own or not acting or not fits(rig, effect):
+            continue
+        places = places_of(rig, effect, list(blocks))
+        for term in [Term(effect, at) for at in places] or [Term(effect)]:
+            usual = starts_of(term, sealed=rig.model["valve"] is None)
+            found += [s for start in usual if (s := _possible(rig, start)) is not None]
+    return found
+
+
+def _possible(rig: Rig, start: Start) -> Start | None:
+    """A start of an effect, halved until a rig can have it (a small arm does not carry as much
+    payload as an effect takes away); None where it never can.
+    """
+    for halvings in range(_MOST_HALVINGS):
+        smaller = start.scaled(0.5**halvings) if halvings else start
+        with contextlib.suppress(ParameterError, RigError, SimulationError):
+            core_rig(smaller.applied(rig))
+            return smaller
+    return None
+
+
+def counted(prepared: Prepared, block: Block, settings: DiagnosisSettings) -> float:
+    """Independent samples that a recording counts as in a block: fewer where its beginning is not
+    judged.
+    """
+    dropped = min(prepared.n, prepared.unsettled.get(block.channel, 0))
+    return settings.effective_samples * (1.0 - dropped / prepared.n)
+
+
+def products_of(
+    problem: Problem,
+    rig: Rig,
+    starts: Sequence[Start],
+    baseline: Sequence[str],
+    noise_level: Mapping[Key, NoiseLevel],
+    left: Mapping[str, float] | None = None,
+) -> Products:
+    """Products of what some recordings show of effects, baseline parameters and the model's error.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    rig : Rig
+        Model near to them, without the effects.
+    starts : sequence of Start
+        Effects at typical sizes.
+    baseline : sequence of str
+        Parameters that may move inside their tolerances.
+    noise_level : dict
+        By block and recording, with the curves of the model's error.
+    left : dict of str to float, optional
+        What a diagnosis leaves unexplained by block [noise levels]; more than one counts as noise.
+
+    Raises
+    ------
+    SimulationError
+        If the model leaves the range in which it holds.
+    """
+    base = residuals(problem, rig, list(baseline))
+    known = known_parameters(rig)
+    tolerances = np.array([known[name].tol for name in baseline])
+    wide = {
+        b.name: max(
+            (
+                own.curves.shape[1]
+                for k, own in noise_level.items()
+                if k[0] == b.name and own.curves is not None
+            ),
+            default=0,
+        )
+        for b in problem.blocks
+    }
+    columns: dict[tuple[Block, str], list[Array]] = {}
+    weights: dict[tuple[Block, str], float] = {}
+    for prepared in problem.recordings:
+        for block in problem.blocks:
+            place = block, prepared.recording.name
+            found = base[block.name, prepared.recording.name]
+            level = noise_level[block.name, prepared.recording.name]
+            slopes = np.zeros((found.value.size, 0))
+            slopes = slopes if found.jacobian is None else found.jacobian * tolerances
+            means, counts = binned(slopes, found.rows, bins_of(prepared))
+            seen = np.flatnonzero(counts)
+            curves = np.zeros((means.shape[0], wide[block.name]))
+            if level.curves is not None:
+                curves[:, : level.curves.shape[1]] = level.curves
+            independent = counted(prepared, block, problem.settings) / max(1, seen.size)
+            noise = level.noise * max(1.0, (left or {}).get(block.name, 1.0))
+            weights[place] = math.sqrt(independent) / noise if noise > 0.0 else 0.0
+            columns[place] = [curves, means, np.zeros((means.shape[0], len(starts)))]
+    for k, start in enumerate(starts):
+        acting = replace(problem, blocks=[b for b in problem.blocks if acts_in(start.effect, b)])
+        try:
+            found_with = changes(acting, start.applied(rig), base, start.effect)
+        except SimulationError:
+            continue  # this size leaves the range in which the model holds
+        for prepared in problem.recordings:
+            for block in acting.blocks:
+                key = block.name, prepared.recording.name
+                change = found_with[key].value - base[key].value
+                means, _ = binned(change, base[key].rows, bins_of(prepared))
+                columns[block, prepared.recording.name][2][:, k] = means
+    out = {}
+    for place, parts in columns.items():
+        every = weights[place] * np.hstack(parts)
+        out[place] = every.T @ every
+    return out
+
+
+def _freed(products: Array, count: int) -> Array:
+    """Products of the other columns when the first ones, each with a normal prior of one unit, have
+    taken what they can.
+    """
+    if count == 0:
+        return products
+    own, mixed = products[:count, :count], products[:count, count:]
+    rest: Array = products[count:, count:] - mixed.T @ solve_normal(own + np.eye(count), mixed)
+    return rest
+
+
+def _copies(products: Array, curves: int, count: int) -> Array:
+    """Size of every effect's small copy that makes all of them in a block together as large as the
+    curves of its error are in a recording; infinite where it does not show.
+    """
+    power = np.diag(products)[products.shape[0] - count :]
+    acting = power > _NOTHING**2
+    error = float(np.trace(products[:curves, :curves])) / max(1, int(acting.sum()))
+    return np.where(acting, np.sqrt(error / np.where(acting, power, 1.0)), math.inf)
+
+
+def _beside_error(products: Array, curves: int, copies: Array) -> Array:
+    """Products of baseline and signatures of a block when the error of its model has taken what it
+    can: its curves, and a small copy of every effect (no model errs in functions of place alone).
+    """
+    own, signatures = np.split(np.arange(products.shape[0]), [products.shape[0] - copies.size])
+    order = np.concatenate([own[:curves], signatures, own[curves:], signatures])
+    rest = np.ones(products.shape[0] - curves)
+    scale = np.concatenate([np.ones(curves), np.where(np.isfinite(copies), copies, 0.0), rest])
+    return _freed(products[np.ix_(order, order)] * np.outer(scale, scale), curves + copies.size)
+
+
+class Limits:
+    """Limits of effects by what some blocks show over some recordings.
+
+    Parameters
+    ----------
+    products : dict
+        As of :func:`products_of`; of several models or experiments joined.
+    starts, baseline
+        As there.
+    settings : DiagnosisSettings
+        How many samples of a recording are independent.
+
+    Attributes
+    ----------
+    each : dict of str to Limit
+        By effect.
+    together : (k, k) array
+        Products of the effects' signatures, of the start of each that shows most, with all that
+        is free taken off.
+    """
+
+    def __init__(
+        self,
+        products: Products,
+        starts: Sequence[Start],
+        baseline: Sequence[str],
+        settings: DiagnosisSettings,
+    ) -> None:
+        names = [str(s.effect) for s in starts]
+        k, count = len(baseline), len(starts)
+        self.each = {name: Limit(name) for name in names}
+        self.together = np.zeros((0, 0))
+        self._apart: dict[tuple[str, str], float] = {}
+        if not products:
+            return
+        of_block: dict[Block, Array] = {}
+        own: dict[tuple[Block, str], Array] = {}
+        copies: dict[Block, Array] = {}
+        for place, values in products.items():
+            block, curves = place[0], values.shape[0] - k - count
+            of_block[block] = of_block.get(block, 0.0) + values
+            # a further recording never enlarges the error of the model
+            sizes = _copies(values, curves, count)
+            copies[block] = np.minimum(copies.get(block, math.inf), sizes)
+            alone = np.diag(_freed(values[curves:, curves:], k))
+            own[place] = np.sqrt(np.clip(alone, 0.0, None) / settings.effective_samples)
+        rest = (_beside_error(v, v.shape[0] - k - count, copies[b]) for b, v in of_block.items())
+        total = np.asarray(sum(rest))
+        # a parameter beyond its tolerances is a rival, too: its own column without a prior
+        free = total - total[:, :k] @ solve_normal(total[:k, :k] + np.eye(k), total[:k])
+        self._labels = [*baseline, *names]
+        self._free, self._power = free, np.clip(np.diag(free), 0.0, None)
+        best = {names[j]: j for j in np.argsort(self._power[k:]).tolist()}
+        for name, j in best.items():
+            where = max(own, key=lambda place: float(own[place][j]))
+            self.each[name] = self._limit(
+                starts[j], k + j, float(own[where][j]), (where[0].name, where[1])
+            )
+        chosen = [k + best[name] for name in self.each]
+        self.together = free[np.ix_(chosen, chosen)]
+
+    def _limit(self, start: Start, at: int, left: float, where: tuple[str, str]) -> Limit:
+        """That of the start of an effect that shows most."""
+        name, power = str(start.effect), float(self._power[at])
+        if left < _NOTHING or power <= 0.0:
+            return Limit(name)
+        other = np.array([label != name for label in self._labels]) & (self._power > _NOTHING**2)
+        taken = np.where(other, self._free[at] ** 2, 0.0) / np.maximum(self._power, _NOTHING**2)
+        apart = np.sqrt(np.clip(power - taken, 0.0, None))
+        for label, distance in zip(self._labels, apart.tolist(), strict=True):
+            known = self._apart.get((name, label), math.inf)
+            self._apart[name, label] = min(known, distance)
+        rival = int(np.argmax(taken))
+        distance = float(apart[rival])
+        named = Limit(
+            name, left, *where, seen=math.sqrt(power), distance=distance, rival=self._labels[rival]
+        )
+        if not start.scalable:
+            return named
+        leading = start.sizes[0]
+        sizes = (DETECTED / named.seen, TOLD_APART / max(distance, 1e-300))
+        return replace(
+            named,
+            size=leading,
+            typical=abs(start.free[leading]),
+            seen_from=_sized(start, sizes[0]),
+            named_from=_sized(start, sizes[1]),
+        )
+
+    def cosine(self, one: str, other: str) -> float:
+        """Cosine of the angle between two effects' signatures."""
+        i, j = (list(self.each).index(name) for name in (one, other))
+        size = math.sqrt(max(float(self.together[i, i] * self.together[j, j]), 1e-300))
+        return min(1.0, abs(float(self.together[i, j])) / size)
+
+    def apart(self, one: str, other: str) -> float:
+        """Distance of two effects at their typical sizes, the smaller of both ways."""
+        return min(self._apart.get((a, b), math.inf) for a, b in ((one, other), (other, one)))
+
+
+def _sized(start: Start, size: float) -> float:
+    """Leading parameter of an effect so many times its start's size; NaN where its bounds hold it,
+    or nobody would look for so much.
+    """
+    leading = start.sizes[0]
+    found = start.scaled(size).free[leading]
+    held = math.isclose(start.scaled(0.999 * size).free[leading], found, rel_tol=1e-9)
+    return math.nan if held or size > _MOST_MULTIPLE else abs(found)
+
+
+def limits_of(
+    problem: Problem,
+    rig: Rig,
+    baseline: Sequence[str],
+    noise_level: Mapping[Key, NoiseLevel],
+    left: Mapping[str, float],
+) -> list[Limit]:
+    """Limits of every effect that a rig can have, by recordings that are there.
+
+    Parameters
+    ----------
+    problem, rig, baseline, noise_level, left
+        As of :func:`products_of`.
+
+    Raises
+    ------
+    SimulationError
+        If the model leaves the range in which it holds.
+    """
+    starts = possible_starts(rig, problem.blocks)
+    products = products_of(problem, rig, starts, baseline, noise_level, left)
+    found = Limits(products, starts, baseline, problem.settings).each.values()
+    return [limit for limit in found if limit.block]
