@@ -72,10 +72,10 @@ def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:
 
 def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
     """True where an answer under another law leaves clearly less of the channels that the answer
-    under the stated law misses, or no more of them with fewer names; physics without a name is not
-    better than a name.
+    under the stated law misses, or no more of them with fewer names; with physics without a name it
+    is no better, as any law that bends more takes some of that.
     """
-    if other.answer.verdict == "unlisted" and stated.answer.named:
+    if other.answer.verdict == "unlisted":
         return False
     channels = [m.channel for m in _mismatches(stated)]
     own, before = (_noises(d.proven, channels) for d in (other, stated))

@@ -803,10 +803,13 @@ _LEFT = {
 
 def budget_sentences(diagnosis: Findings) -> list[tuple[str, str]]:
     """Each block with a budget and that in words."""
-    return [
-        (block, budget_sentence(own, left_in(diagnosis, block)))
-        for block, own in budgets(diagnosis).items()
-    ]
+    found = []
+    for block, own in budgets(diagnosis).items():
+        left, part = left_in(diagnosis, block), diagnosis.answer.part_of(block)
+        # what is said to be missing is no error of the model
+        missing = left == "error" and part is not None and part.group.verdict == "unlisted"
+        found.append((block, budget_sentence(own, "more" if missing else left)))
+    return found
 
 
 def budget_sentence(terms: Sequence[BudgetTerm], left: str = "") -> str:

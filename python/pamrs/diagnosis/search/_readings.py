@@ -31,7 +31,7 @@ from pamrs.diagnosis.fit import (
     residuals,
     stacked,
 )
-from pamrs.diagnosis.noise import excess, noise_levels
+from pamrs.diagnosis.noise import correlation_time, excess, noise_levels
 from pamrs.diagnosis.prepare import Prepared, Residual, implausible
 from pamrs.diagnosis.search._baseline import refitted, thorough
 from pamrs.errors import SimulationError
@@ -327,7 +327,8 @@ def _free_is_listed(problem: Problem, found: Fit, reading: Reading) -> bool:
     strain = np.array([0.0, *(found.moved[name] for name in names)][: design.shape[1]])
     inverse = np.linalg.pinv(design.T @ design + prior, hermitian=True)
     away = abs(float((inverse @ (design.T @ rows + prior @ strain))[0]))
-    coloured = max(1.0, float(rows @ rows) / max(1, rows.size))
+    # what the model leaves besides is coloured, and as many numbers fewer
+    coloured = max(1.0, float(rows @ rows) / max(1, rows.size) * correlation_time(rows))
     spread = _STDS * math.sqrt(max(0.0, inverse[0, 0]) * coloured)
     exact = settings.gauge_error * (abs(reading.offset) or 1.0)
     return away <= max(exact, spread) and away + spread <= _CLOSER * reading.size
