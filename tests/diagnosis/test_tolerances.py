@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 import pamrs
 from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Problem, fit, free_baseline, residuals
-from pamrs.diagnosis.fit._held import in_tolerances, moved_slope, moved_value
+from pamrs.diagnosis.fit._fitting import Scaling
+from pamrs.diagnosis.fit._held import in_tolerances, largest_value, moved_slope, moved_value
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import Prepared, begun_alike, predicted, residual
 from pamrs.rig import Parameter
 from pamrs.simulation import core_rig
-from tests.diagnosis.asked import problem_of
+from tests.diagnosis.asked import SETTINGS, problem_of
 from tests.diagnosis.healthy import healthy_case
 
 SHAPES = ["muscle.flexor.rest_length", "transmission.extensor.radius"]
@@ -35,6 +36,25 @@ def judged(case: pamrs.Case, kind: str) -> Problem:
 @pytest.fixture(scope="module")
 def pair() -> Problem:
     return judged(healthy_case("antagonistic_joint", 3, 100, sharp=False), "arm")
+
+
+def test_no_effect_is_larger_than_its_rig_allows() -> None:
+    """No friction pulls more than its muscle, no reading drifts by more than a tenth of it."""
+    rig = pamrs.rigs.hanging_mass()
+    pressure = max(rig.limits["max_pressure"], rig.tables("supply")[""]["initial_pressure"])
+    assert rig.muscle is not None
+    pull = float(rig.muscle.force(pressure, 0.0))
+    most = {
+        "muscle_hysteresis.friction_constant": min(pull, 1e4),
+        "muscle_hysteresis.friction_pressure": pull / pressure,
+        "gauge_drift.change": 0.1 * pressure,
+    }
+    assert {name: largest_value(rig, name) for name in most} == pytest.approx(most)
+    far = dict.fromkeys(most, 1e9)
+    scaling = Scaling(rig, [], far, SETTINGS)
+    found = [scaling.value(name, x) for name, x in zip(most, scaling.start, strict=True)]
+    assert found == pytest.approx(list(most.values()))
+    assert scaling.value("gauge_drift.change", -1e9) == pytest.approx(-most["gauge_drift.change"])
 
 
 def test_every_tolerance_of_an_arm_is_free(pair: Problem) -> None:

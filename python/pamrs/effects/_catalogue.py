@@ -85,6 +85,7 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         rivals=tuple(words.get("rivals", ())),
         stated_by=tuple(words.get("stated_by", ())),
         like_values=tuple(words.get("like_values", ())),
+        most=dict(words.get("most", {})),
         bench_units=tuple(BenchUnit(**unit) for unit in words.get("bench_units", ())),
         **{key: told[key] for key in _OF_CORE},
         **{key: words[key] for key in ("name", "equation", "fingerprint", "separates")},

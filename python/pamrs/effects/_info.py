@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,6 +291,9 @@ class EffectInfo:
         says it.
     shares : str
         What it has in common with others, as the end of "the model leaves out": ``a leak``.
+    most : dict of str to str
+        Parameters that a rig bounds: ``pull`` of a muscle, ``pull per pressure``, or ``drift`` of a
+        reading.
     bench : str
         What to do on the bench to see it or to be rid of it.
     bench_units : tuple of BenchUnit
@@ -331,6 +335,7 @@ class EffectInfo:
     label: str = ""
     stated_by: tuple[str, ...] = ()
     like_values: tuple[str, ...] = ()
+    most: Mapping[str, str] = field(default_factory=dict, hash=False)
     acts_in: tuple[str, ...] = ()
     experiment: str = ""
     shares: str = ""

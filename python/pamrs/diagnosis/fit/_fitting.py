@@ -22,6 +22,7 @@ from pamrs.diagnosis.fit._held import (
     ends_in_tolerances,
     in_tolerances,
     known_parameters,
+    largest_value,
     moved_slope,
     moved_value,
     with_known,
@@ -420,29 +421,27 @@ class Scaling:
         ends = [ends_in_tolerances(known[n], walls, freed=n in freed) for n in baseline]
         lower, upper = [low for low, _ in ends], [high for _, high in ends]
         for name, start in starts.items():
-            info = find_parameter(name)
+            info, most = find_parameter(name), largest_value(nominal, name)
             if _logarithmic(name):
                 lower.append(math.log(max(info.lower, start * 1e-3) / start))
-                upper.append(math.log(min(info.upper, start * 1e3) / start))
+                upper.append(math.log(min(most, start * 1e3) / start))
             else:
                 # a parameter that starts from next to nothing has the scale of what it may become
                 least = _LEAST_SCALE * max(abs(s) for s in info.starts)
                 self.scale[name] = max(abs(start), least) or 10.0
-                lower.append(info.lower / self.scale[name])
-                upper.append(info.upper / self.scale[name])
+                lower.append(max(info.lower, -most) / self.scale[name])
+                upper.append(most / self.scale[name])
         self.bounds = (np.array(lower), np.array(upper))
-        self.start = np.array(
-            [0.0] * len(self.baseline)
-            + [0.0 if _logarithmic(n) else s / self.scale[n] for n, s in starts.items()]
-        )
+        begun = [0.0 if _logarithmic(n) else s / self.scale[n] for n, s in starts.items()]
+        self.start = np.clip(np.array([0.0] * len(self.baseline) + begun), *self.bounds)
 
     def value(self, name: str, x: float) -> float:
         """A parameter [SI] from its scaled number."""
         if name in self.centre:
             return moved_value(self.known[name], x)
-        info = find_parameter(name)
+        info, most = find_parameter(name), largest_value(self.nominal, name)
         found = self.starts[name] * math.exp(x) if _logarithmic(name) else x * self.scale[name]
-        return min(max(found, info.lower), info.upper)
+        return min(max(found, info.lower, -most), most)
 
     def slope(self, name: str, x: float) -> float:
         """Change of a parameter [SI] with its scaled number."""

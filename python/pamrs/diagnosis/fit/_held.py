@@ -6,14 +6,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 from pamrs.diagnosis.fit._starts import CHOSEN
-from pamrs.effects import CATALOGUE, EFFECTS, Form
+from pamrs.effects import CATALOGUE, EFFECTS, Form, effect_of, find_parameter
 from pamrs.rig import Parameter, Rig, named_entries
 
 # least tolerance of a held effect: its deviation came of a lacking model (decision 34)
 _HELD_SHARE = 0.3
+_MOST_DRIFT = 0.1  # of what a gauge or a load cell reads: it is broken when it drifts by more
+_USUAL_PRESSURE = 1e6  # [Pa] that a rig has of which nothing tells how high it goes
 
 
 _FIXED = (*CHOSEN, "threshold")
@@ -102,6 +105,29 @@ _LEAST_RATIO = 1e-3  # share of its nominal value that a positive parameter has 
 def _is_positive(known: Parameter) -> bool:
     """Whether a parameter is a positive quantity: below its value its tolerance is a factor."""
     return known.lower >= 0.0 < known.value
+
+
+@lru_cache(maxsize=512)
+def largest_value(rig: Rig, name: str) -> float:
+    """Largest value of an effect's parameter that a rig can have [SI]: no friction is larger than
+    the pull of the muscle, no reading drifts by more than a tenth of the pressure that there can be
+    or of the force that it makes.
+    """
+    effect, own = effect_of(name), find_parameter(name)
+    most = EFFECTS[effect.id].most.get(own.name) if effect else None
+    if most is None:
+        return own.upper
+    pressures = [t["initial_pressure"] for t in rig.tables("supply").values()]
+    pressure = max([rig.limits.get("max_pressure", 0.0), *pressures]) or _USUAL_PRESSURE
+    pulls = [rig.muscle_of(m).force(pressure, 0.0) for m in rig.tables("muscle")]
+    counts = [float(t["count"]) for t in rig.tables("muscle").values()]
+    pull = max(map(float, pulls), default=math.inf)
+    if most == "pull":
+        return min(own.upper, pull)
+    if most == "pull per pressure":
+        return min(own.upper, pull / pressure)
+    every = pull * max(counts, default=1.0) if own.unit == "N" else pressure
+    return min(own.upper, _MOST_DRIFT * every)
 
 
 def moved_value(known: Parameter, tolerances: float) -> float:
