@@ -35,8 +35,7 @@ Array = NDArray[np.float64]
 class Source:
     """One recording and how it is told: file, rig, compliance [ml/cmH2O], unit of its pressure,
     volume ("volume", a column with a flow, "meters" for both venturis, "level" for these with the
-    volume of each breath beginning at nothing), whether the supply has a gauge beside its command
-    (a second channel of the same numbers would hide a unit), and whether a half is held out.
+    volume of each breath beginning at nothing), and whether a half is held out.
     """
 
     file: str
@@ -44,7 +43,6 @@ class Source:
     compliance: float = 20.0
     unit: str = "cmH2O"
     volume: str = "volume"
-    gauge: bool = True
     halves: bool = True
 
 
@@ -53,8 +51,8 @@ CASES = {
         f"{RECORD}-Wrong-Lung-Setting-Test4/z_covent_pc_4 (first run wrong lung setting).dat"
     ),
     "missing_setting": Source(f"{RECORD}-RedoComplete/covent_pc_8.dat", "c10_r10", 10.0),
-    "unit_new": Source(NEW, volume="level", gauge=False),
-    "unit_old": Source(OLD, volume="level", gauge=False),
+    "unit_new": Source(NEW, volume="level"),
+    "unit_old": Source(OLD, volume="level"),
     "hose_off": Source(
         "2020-06-18-disconnected.dat", "c10_r20", 10.0, volume="flow_uncorrected", halves=False
     ),
@@ -135,11 +133,12 @@ def write(folder: Path, name: str, text: str) -> None:
     source, found = CASES[name], columns(text)
     time = found["time(sec)"]
     airway, unit = found["pressure"], source.unit
-    table = {"time [s]": time, f"supply_command [{unit}]": airway}
-    if source.gauge:  # the supply is no question: its command is what it reads one sample later
-        table[f"supply_command [{unit}]"] = np.append(airway[1:], airway[-1])
-        table[f"supply_pressure [{unit}]"] = airway
-    table["muscle_pressure [cmH2O]"] = lung_pressure(found, source)
+    table = {  # the supply is no question: its command is what it reads one sample later
+        "time [s]": time,
+        f"supply_command [{unit}]": np.append(airway[1:], airway[-1]),
+        f"supply_pressure [{unit}]": airway,
+        "muscle_pressure [cmH2O]": lung_pressure(found, source),
+    }
     folder.mkdir(parents=True, exist_ok=True)
     np.savetxt(
         folder / "log.csv", np.column_stack(list(table.values())), fmt="%.6g", delimiter=",",

@@ -69,12 +69,6 @@ def test_a_zero_of_the_flow_meters_is_levelled_or_left(convert: ModuleType) -> N
     assert np.isclose(drop_of, convert.CMH2O, rtol=1e-3)
 
 
-def test_a_unit_is_judged_by_one_channel(convert: ModuleType, tmp_path: Path) -> None:
-    convert.write(tmp_path, "unit_old", log(dp_inhale=TIME, dp_exhale=TIME))
-    case = pamrs.load_case(tmp_path)
-    assert set(case.channels) == {"supply_command", "muscle_pressure"}
-
-
 def test_files_are_read_from_the_history(convert: ModuleType, tmp_path: Path) -> None:
     subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
     with pytest.raises(ValueError, match="README"):

@@ -23,14 +23,14 @@ PACKAGES = {
     "cli": 1380,
     "control": 4622,
     "design": 532,
-    "diagnosis": 11029,
-    "effects": 408,
+    "diagnosis": 11053,
+    "effects": 410,
     "experiments": 1060,
     "findings": 946,
     "fit": 2965,
     "library": 71,
     "recordings": 4882,
-    "report": 2066,
+    "report": 2071,
     "rig": 2238,
     "rigs": 139,
     "simulation": 1095,
@@ -39,7 +39,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 26674,
+    "tests": 26688,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -47,7 +47,7 @@ ASIDE = {
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 36021
+MOST = 36052
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

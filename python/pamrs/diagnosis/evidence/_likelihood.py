@@ -41,8 +41,8 @@ class BlockLikelihood:
         Logarithm of the density of the bin means for each.
     volume : (k,) array
         Logarithm of the determinant of their covariance for each.
-    count, recordings : int
-        How many bins there are, in how many recordings.
+    count : int
+        How many bins there are.
     power : float
         Mean square of the bin means, in noise levels squared.
     error_power : float
@@ -53,7 +53,6 @@ class BlockLikelihood:
     by_size: Array
     volume: Array
     count: int
-    recordings: int
     power: float
     error_power: float = 1.0
 
@@ -158,15 +157,13 @@ class _Covariance:
         if not math.isfinite(power):
             never = np.full(self._sizes.size, -math.inf)
             return BlockLikelihood(
-                self._sizes, never, self._volume, count, len(rows), math.inf, self._error_power
+                self._sizes, never, self._volume, count, math.inf, self._error_power
             )
         logs = [math.log(max(sized.square(rows), _LEAST_SQUARE)) for sized in self._each]
         square = np.array([self._without.square(rows), *np.exp(self._between(logs))])
         by_size = -0.5 * (square + self._volume)
         mean = power / max(1, count)
-        return BlockLikelihood(
-            self._sizes, by_size, self._volume, count, len(rows), mean, self._error_power
-        )
+        return BlockLikelihood(self._sizes, by_size, self._volume, count, mean, self._error_power)
 
 
 class _Sized:

@@ -121,7 +121,7 @@ def weigh(
     start = candidates[0]
     walls = weighing.settings.most_tolerances
     named = [c for c in candidates if c.terms and not is_absent(c, walls)]
-    share = _counted([start, *named], suspects, weighing.settings.effective_samples)
+    share = _counted([start, *named], suspects)
     scores = {c.hypothesis: log_weight(c, start, suspects, weighing, share) for c in named}
     scores[UNDECIDED] = log_weight(start, start, suspects, weighing, share)
     scores[UNLISTED] = _log_weight_unlisted(start, suspects, share)
@@ -155,16 +155,14 @@ def _share_taken(candidate: Candidate, baseline: Candidate, suspects: list[Block
     return min(1.0, max(0.0, 1.0 - after / before)) if before > 0.0 else 0.0
 
 
-def _counted(candidates: list[Candidate], suspects: list[Block], independent: float) -> float:
+def _counted(candidates: list[Candidate], suspects: list[Block]) -> float:
     """Share of the logarithm of evidence that counts (a power posterior): more, the nearer to noise
     the hypothesis is that is nearest. Noise is independent from bin to bin, and what no hypothesis
-    explains is not; a recording has so many independent samples at least.
+    explains is not.
     """
-    own = [[c.likelihood()[block.name] for block in suspects] for c in candidates]
-    left = min(max((found.power for found in blocks), default=1.0) for blocks in own)
-    samples = independent * sum(found.recordings for found in own[0])
-    least = max(_LEAST_SHARE, samples / max(1, sum(found.count for found in own[0])))
-    return min(_MOST_SHARE, max(least, _NOISE_SHARE / max(left, 1e-9)))
+    powers = [[c.likelihood()[block.name].power for block in suspects] for c in candidates]
+    left = min(max(own, default=1.0) for own in powers)
+    return min(_MOST_SHARE, max(_LEAST_SHARE, _NOISE_SHARE / max(left, 1e-9)))
 
 
 def log_weight(

@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 
 from pamrs._arrays import Array
-from pamrs.channels import channel_of, unit_of
+from pamrs.channels import block_of, channel_of, unit_of
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -327,9 +327,10 @@ def _free_is_listed(problem: Problem, found: Fit, reading: Reading) -> bool:
     strain = np.array([0.0, *(found.moved[name] for name in names)][: design.shape[1]])
     inverse = np.linalg.pinv(design.T @ design + prior, hermitian=True)
     away = abs(float((inverse @ (design.T @ rows + prior @ strain))[0]))
-    # what the model leaves besides is coloured, and as many numbers fewer
-    coloured = max(1.0, float(rows @ rows) / max(1, rows.size) * correlation_time(rows))
-    spread = _STDS * math.sqrt(max(0.0, inverse[0, 0]) * coloured)
+    # what the model leaves besides is coloured, so as many numbers fewer, and other in each block
+    weight = design @ inverse[:, 0]
+    coloured = float(np.sum((weight * rows) ** 2)) * correlation_time(rows)
+    spread = _STDS * math.sqrt(max(0.0, inverse[0, 0], coloured))
     exact = settings.gauge_error * (abs(reading.offset) or 1.0)
     return away <= max(exact, spread) and away + spread <= _CLOSER * reading.size
 
@@ -341,9 +342,13 @@ def _possible(problem: Problem, nominal: Rig) -> bool:
 
 
 def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:
-    """Ways to read the channels that the blocks use: each alone, all of one name, and all of one
-    dimension.
+    """Ways to read the channels that the blocks use: each alone, all of one name, those of one part
+    of the rig (a supply's gauge and its command), and all of one dimension.
     """
+
+    def part(name: str) -> tuple[str, str, str]:
+        return channel_of(name).partition("_")[0], block_of(name), unit_of(name)
+
     used = list(
         dict.fromkeys(name for block in problem.blocks for name in (block.channel, *block.drives))
     )
@@ -352,6 +357,7 @@ def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:
         [
             *((name,) for name in used),
             *(tuple(n for n in used if channel_of(n) == channel_of(name)) for name in used),
+            *(tuple(n for n in used if part(n) == part(name)) for name in used),
             *(tuple(n for n in used if unit_of(n) == unit_of(name)) for name in used),
         ]
     )
