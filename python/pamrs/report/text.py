@@ -168,17 +168,18 @@ def limit_sizes(limit: Limit, units: Units | None = None) -> list[str]:
     """Typical size of an effect and those from which it is seen and told apart, in the units of a
     bench or those of a rig file; empty where there is none.
     """
-    si = find_parameter(limit.size).unit if limit.size else "1"
+    scaled = find_parameter(limit.size) if limit.size else None
+    si, most = (scaled.unit, "up to " * scaled.restricts) if scaled else ("1", "")
     found = []
-    for size in (limit.typical, limit.seen_from, limit.named_from):
+    for size, least in ((limit.typical, ""), (limit.seen_from, most), (limit.named_from, most)):
         if not is_number(size):
             found.append("")
         elif units is None:
             unit, factor = bench_unit(limit.size, si, size)
-            found.append(with_unit(format_number(factor * size, 2), unit))
+            found.append(with_unit(least + format_number(factor * size, 2), unit))
         else:
             unit = units.usual(si)
-            found.append(with_unit(f"{from_si(size, unit, si, difference=True):.2g}", unit))
+            found.append(with_unit(f"{least}{from_si(size, unit, si, difference=True):.2g}", unit))
     return found
 
 
