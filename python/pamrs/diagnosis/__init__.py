@@ -281,7 +281,9 @@ def _answer(
         )
         inner = judged
     # the first few are all that a terminal shows: first what may make the answer wrong
-    warnings = [*inner.losses.told, *ready.suspected, *begun, *ready.told]
+    # a unit that is found settles what was doubted under the one that was said
+    doubts = ready.doubts if read is None else []
+    warnings = [*inner.losses.told, *ready.suspected, *doubts, *begun, *ready.told]
     warnings += [*diagnosis.warnings, *ready.masked, *moved]
     found = _as_found(case, inner, outer)
     data = data_used(found, counts, inner.blocks, case.rig, inner.core, unjudged)

@@ -51,8 +51,8 @@ class Ready:
         that is known before any fit; impossible samples are masked.
     blocks : list of Block
         Blocks of the rig that its channels surround.
-    suspected : list of str
-        Units and columns to be looked at.
+    suspected, doubts : list of str
+        What was left out and why; units and columns to be looked at.
     told, masked : list of str
         What is no proof or taken as known; and samples that were masked.
     faulty : list of Faulty
@@ -62,6 +62,7 @@ class Ready:
     case: Case
     blocks: list[Block]
     suspected: list[str]
+    doubts: list[str]
     told: list[str]
     masked: list[str]
     faulty: list[Faulty]
@@ -89,7 +90,7 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
     """
     case = replace(case, recordings=own_of_rig(case.rig, case.recordings))
     _check_rig(case)
-    suspected = [*suspected_units(case), *noted_units(case)]
+    doubts = [*suspected_units(case), *noted_units(case)]
     try:
         case, held = _nominal(case, settings)
         alive, dead = without_dead_commands(case.recordings, case.rig)
@@ -102,18 +103,18 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
                 raise DiagnosisError(f"recording {recording.name!r}: {why}")
         check_plausible(case.recordings, case.rig, case.name, settings)
     except DiagnosisError as error:
-        raise DiagnosisError("\n".join([str(error), *suspected])) from error
+        raise DiagnosisError("\n".join([str(error), *doubts])) from error
     case, clipped, copies, masked = _sound(case, settings)
     case, empty = left_out(case, lambda r: unusable(r, case.rig, core, settings))
-    suspected = [*left, *odd, *empty, *suspected]
+    suspected = [*left, *odd, *empty]
     blocks = blocks_beside_tanks(case.rig, case.channels)
     if not blocks:
         told = (
             f"case {case.name!r}: its channels ({', '.join(case.channels)}) do not surround any "
             f"block of the rig ({', '.join(case.rig.blocks)}); measure {_lacking(case)}"
         )
-        raise DiagnosisError("\n".join([told, *left, *odd, *empty]))
-    return Ready(case, blocks, suspected, [*copies, *held], masked, [*dead, *clipped])
+        raise DiagnosisError("\n".join([told, *suspected]))
+    return Ready(case, blocks, suspected, doubts, [*copies, *held], masked, [*dead, *clipped])
 
 
 def left_out(case: Case, fault: Callable[[Recording], str]) -> tuple[Case, list[str]]:

@@ -275,6 +275,7 @@ def _limits(diagnosis: Findings) -> list[tuple[str, ...]]:
         (
             words.label(own.effect),
             words.spoken_name(own.block),
+            words.label(own.size.rpartition(".")[2]),
             *words.limit_sizes(own)[1:],
             words.set_label([own.rival]) if own.rival else "",
         )

@@ -507,7 +507,7 @@ def checked(case: Case) -> Check:
         If units or columns cannot be right, or no block of the rig can be judged.
     """
     ready = readied(case, DiagnosisSettings())
-    cautions = [*case.rig.cautions, *ready.suspected, *_issues(case)]
+    cautions = [*case.rig.cautions, *ready.suspected, *ready.doubts, *_issues(case)]
     return Check("", list(dict.fromkeys(cautions)), dict(case.inputs))
 
 

@@ -227,7 +227,7 @@ class Plan:
             "at size",
             "seen from",
             "named from",
-            "most like it",
+            "easily confused with",
         )
         rows: list[tuple[str, ...]] = [head]
         for own in self.limits:
