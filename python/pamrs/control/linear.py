@@ -239,7 +239,10 @@ def linearise(
     """
     one_of("side", side, SIDES)
     one_of("friction", friction, FRICTIONS)
-    constant = _held_supplies(rig) if held is None else held
+    constant = held
+    if constant is None:  # what changes slowly, or not by a command
+        slow = rig.tables("supply").keys() - direct_regulators(rig)
+        constant = tuple(dotted("supply_pressure", name) for name in slow)
 
     def is_held(name: str) -> bool:
         return name in constant or channel_of(name) in constant
@@ -255,7 +258,11 @@ def linearise(
     (states, inputs, outputs), (a, b, c) = core_rig(rig).linearise(start, side)
     free = [k for k, name in enumerate(states) if not is_held(name)]
     read = [k for k, name in enumerate(outputs) if not is_held(name)]
-    driving = _driving(inputs, moving)
+    driving = [  # all inputs but regulators whose pressure is held
+        k
+        for k, name in enumerate(inputs)
+        if channel_of(name) != "supply_command" or name.partition(".")[2] in moving
+    ]
     inputs = [inputs[k] for k in driving]
     a, b, c = a[np.ix_(free, free)], b[np.ix_(free, driving)], c[np.ix_(read, free)]
     named = [row for row, k in enumerate(free) if states[k] in outputs]
@@ -288,15 +295,6 @@ def _start(
     return dict(initial)
 
 
-def _driving(inputs: Sequence[str], moving: Sequence[str]) -> list[int]:
-    """Indices of the inputs that drive a rig: all but regulators whose pressure is held."""
-    return [
-        k
-        for k, name in enumerate(inputs)
-        if channel_of(name) != "supply_command" or name.partition(".")[2] in moving
-    ]
-
-
 def _check_driven(
     a: Array, b: Array, named: Sequence[int], commands: Mapping[str, float], side: str
 ) -> None:
@@ -315,14 +313,6 @@ def _said(kind: str, names: Collection[str]) -> str:
     if known:
         return f"{kind} {', '.join(known)}"
     return f"one {kind}" if names else f"no {kind}"
-
-
-def _held_supplies(rig: Rig) -> tuple[str, ...]:
-    """Supplies that change slowly, or not by a command: all but regulators without a valve."""
-    direct = direct_regulators(rig)
-    return tuple(
-        dotted("supply_pressure", name) for name in rig.tables("supply") if name not in direct
-    )
 
 
 def _check_rest(rig: Rig, simulator: Simulator, commands: Mapping[str, float]) -> None:

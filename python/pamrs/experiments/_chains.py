@@ -398,16 +398,6 @@ def _most(
     return [float(p) for p in said]
 
 
-def _mapped(rig: Rig, chain: Chain) -> list[float]:
-    """Highest pressures of the force maps of the muscles in the chamber of a chain [Pa, gauge]."""
-    muscles, own = rig.ports("muscle"), qualified("chamber", chain.chamber)
-    return [
-        float(table["map_pressure"][-1])
-        for name, table in rig.tables("muscle").items()
-        if table["model"] == "map" and muscles[name]["chamber"] == own
-    ]
-
-
 def top_of(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) -> float:
     """Highest pressure that a chain is moved to [Pa, gauge].
 
@@ -427,7 +417,12 @@ def top_of(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) 
     """
     said = _most(rig, chain, highest)
     if not said and not chain.valves:
-        said = _mapped(rig, chain)
+        muscles, own = rig.ports("muscle"), qualified("chamber", chain.chamber)
+        said = [  # the highest pressures of force maps
+            float(table["map_pressure"][-1])
+            for name, table in rig.tables("muscle").items()
+            if table["model"] == "map" and muscles[name]["chamber"] == own
+        ]
     if chain.valves:
         return min(0.8 * _source(rig, chain), *said, math.inf)
     if not said:

@@ -269,5 +269,4 @@ def _skipped_reversals(signs: Array) -> Index:
     """Reversals across one or two equal samples: up, still, down."""
     one = (signs[:, 2:] * signs[:, :-2] < 0) & (signs[:, 1:-1] == 0)
     two = (signs[:, 3:] * signs[:, :-3] < 0) & (signs[:, 2:-1] == 0) & (signs[:, 1:-2] == 0)
-    total: Index = np.sum(one, axis=1) + np.sum(two, axis=1)
-    return total
+    return np.asarray(np.sum(one, axis=1) + np.sum(two, axis=1))

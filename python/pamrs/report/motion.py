@@ -131,7 +131,13 @@ def _draw_channel(
             alpha=0.6,
             label="_" if "recorded" in told else "recorded",
         )
-    beside = nominal if nominal is not None and name in nominal and _answers(head) else None
+    beside = (
+        nominal
+        if nominal is not None
+        and name in nominal
+        and head not in ("valve_command", "supply_command")
+        else None
+    )
     if beside is not None:
         time, value = decimate(beside.time, factor * beside[name])
         axes.plot(
@@ -151,11 +157,6 @@ def _draw_channel(
         lw=1.3,
         label=f"{label} {'simulated' if beside is None else 'model'}".strip(),
     )
-
-
-def _answers(head: str) -> bool:
-    """Whether a channel is what a rig does, and not what it is told to do."""
-    return head not in ("valve_command", "supply_command")
 
 
 def _of(result: Simulation, heads: tuple[str, ...]) -> list[str]:

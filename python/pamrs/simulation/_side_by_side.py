@@ -145,7 +145,11 @@ def simulate_batch(
         core,
         count,
         rows,
-        prescribed(_repeated(signals, rows), begin, count),
+        prescribed(
+            {n: np.full(rows, float(v)) if v.ndim == 0 else v for n, v in signals.items()},
+            begin,
+            count,
+        ),
         sample_time,
         chosen_step(sample_time, step),
         _parameters(rig, plants, count),
@@ -201,11 +205,6 @@ def _row_count(signals: Mapping[str, Array], duration: float | None, sample_time
                 "needed"
             )
     return int(rows)
-
-
-def _repeated(signals: Mapping[str, Array], rows: int) -> dict[str, Array]:
-    """Signals over time; a number stays the same in every row."""
-    return {n: np.full(rows, float(v)) if v.ndim == 0 else v for n, v in signals.items()}
 
 
 def _check_size(

@@ -458,7 +458,7 @@ def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
     values: nothing is read or wired again. Of any other, muscles that are those of ``like`` are not
     compiled again.
     """
-    cached: Any = rig.__dict__.get("_compiled")
+    cached: _core.Rig | None = rig.__dict__.get("_compiled")
     if cached is None:
         try:
             cached = _revalued(rig, like)
@@ -469,8 +469,7 @@ def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
             known = {name: own.unit for name, own in rig.parameters.items()}
             raise ParameterError(rig.units.retold(str(error), known)) from None
         object.__setattr__(rig, "_compiled", cached)
-    compiled: _core.Rig = cached
-    return compiled
+    return cached
 
 
 def _revalued(rig: Rig, like: _core.Rig | None) -> _core.Rig | None:
