@@ -250,7 +250,14 @@ def linearise(
     moving = [name for name in rig.tables("supply") if not is_held(dotted("supply_pressure", name))]
     check_smooth(rig, supplies=bool(moving))
     rig = resting(without_dry_friction(rig) if friction == "moving" else rig)
-    start = _start(rig, angle, joint, chamber, initial)
+    if angle is None and not initial:
+        raise ParameterError(
+            "angle is missing: give the angle that the rig holds, or initial values that hold it "
+            "(RigController.holding)"
+        )
+    start = dict(initial or {})
+    if angle is not None:
+        start = equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
     simulator = Simulator(rig, sample_time=SAMPLE, initial=start)
     first = simulator.observe()
     commands = {**closed(rig), **kept(rig, first)}
@@ -275,24 +282,6 @@ def linearise(
     return LinearModel(
         a[np.ix_(used, used)], b[used], c[:, used], *names, {**first, **commands}, side
     )
-
-
-def _start(
-    rig: Rig,
-    angle: float | None,
-    joint: str,
-    chamber: str,
-    initial: Mapping[str, float] | None,
-) -> dict[str, float]:
-    """The operating point: what holds an angle, or the initial values themselves."""
-    if angle is not None:
-        return equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
-    if not initial:
-        raise ParameterError(
-            "angle is missing: give the angle that the rig holds, or initial values that hold it "
-            "(RigController.holding)"
-        )
-    return dict(initial)
 
 
 def _check_driven(

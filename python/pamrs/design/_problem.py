@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from pamrs._arrays import Array, ArrayLike, Mask
 from pamrs._checks import check_names, one_of, positive, refused, whole
@@ -283,6 +282,8 @@ class JointProblem:
         area_tolerance : float
             Share of the work wanted that may be missing [1].
         """
+        from scipy.integrate import cumulative_trapezoid
+
         highest = min(self.max_contraction, self.muscle.contraction_limits[1])
         contraction = np.linspace(0.0, highest, 2001)
         length = float(self.muscle.parameters["rest_length"])

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from pamrs import _core
-from pamrs._arrays import Array, Mask
+from pamrs._arrays import Array, Mask, stretches
 from pamrs.channels import dotted
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
@@ -587,8 +587,7 @@ def _free(
     if not chain.moves or not free.any():
         return Range(0.1 * top, min(0.75 * top, 7.0e5) if not chain.moves else top)
     # the longest stretch: on its way up a joint may pass a place twice
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], free.astype(np.int8), [0]])))
-    a, b = max(zip(edges[::2], edges[1::2], strict=True), key=lambda ab: ab[1] - ab[0])
+    a, b = max(stretches(free), key=lambda ab: ab[1] - ab[0])
     low, high = float(pressure[a]), min(float(pressure[b - 1]), top)
     return Range(low, high) if high > 1.2 * low else Range(0.3 * top, top)
 

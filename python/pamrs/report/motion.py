@@ -97,7 +97,10 @@ def write_channels(
             axes.set_title(title)
             axes.set_ylabel(laboratory_unit(names[0])[0])
             if len(axes.lines) > 1:
-                _legend_above(axes)
+                place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
+                axes.legend(
+                    ncols=6, borderaxespad=0.1, handlelength=1.8, columnspacing=1.3, **place
+                )
         rows[-1].set_xlabel("time [s]")
         return write_atomically(path, png_bytes(figure))
 
@@ -353,9 +356,3 @@ class _Scene:
         )
         self.text.set_text(f"{self.result.time[row]:.2f} s    {said}    {bars} bar")
         return self.arm, self.payload, self.text, *(group.line for group in self.groups)
-
-
-def _legend_above(axes: Axes) -> None:
-    """Legend in one line above the axes, flush right."""
-    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
-    axes.legend(ncols=6, borderaxespad=0.1, handlelength=1.8, columnspacing=1.3, **place)

@@ -332,9 +332,7 @@ def sensor_zero(rig: Rig, kind: str, key: str, block: str) -> float:
     return float(tables.get(block, tables.get("", {})).get(key, 0.0))
 
 
-def _named(
-    channel: str, given: Signals, names: list[str], block: str
-) -> dict[str, ArrayLike]:
+def _named(channel: str, given: Signals, names: list[str], block: str) -> dict[str, ArrayLike]:
     """A user's argument as signals by the core's names."""
     if not isinstance(given, Mapping):
         if len(names) > 1:

@@ -138,7 +138,12 @@ def simulate_batch(
     reduced = dict(reduce or {})
     kept = -(-rows // whole("every", every, 1))
     wanted = names_of("record", record)
-    _check_size(count, kept, wanted, reduced)
+    if count * (kept * len(wanted) + len(reduced)) > MOST_NUMBERS:
+        raise ParameterError(
+            f"{count} plants with {kept} rows of {len(wanted)} channels are not allowed: at most "
+            f"{MOST_NUMBERS} numbers (2 GB); raise every, or ask for numbers of whole runs "
+            "(reduce)"
+        )
     begin = {name: rowwise(f"initial {name}", (initial or {})[name], count) for name in starts}
     core = core_rig(rig)
     recorded, numbers, ended = _core.side_by_side(
@@ -205,19 +210,6 @@ def _row_count(signals: Mapping[str, Array], duration: float | None, sample_time
                 "needed"
             )
     return int(rows)
-
-
-def _check_size(
-    plants: int, kept: int, record: Sequence[str], reduced: Mapping[str, Reduction]
-) -> None:
-    """Refuse results that would not fit in memory, before anything runs."""
-    numbers = plants * (kept * len(record) + len(reduced))
-    if numbers > MOST_NUMBERS:
-        raise ParameterError(
-            f"{plants} plants with {kept} rows of {len(record)} channels are not allowed: at most "
-            f"{MOST_NUMBERS} numbers (2 GB); raise every, or ask for numbers of whole runs "
-            "(reduce)"
-        )
 
 
 def _reduction(name: str, asked: Reduction, rows: int) -> tuple[str, str, list[float]]:
