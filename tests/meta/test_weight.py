@@ -20,26 +20,26 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1108,
-    "cli": 1380,
-    "control": 4622,
-    "design": 532,
-    "diagnosis": 11053,
-    "effects": 410,
-    "experiments": 1060,
+    "cli": 1363,
+    "control": 4594,
+    "design": 530,
+    "diagnosis": 11000,
+    "effects": 404,
+    "experiments": 1052,
     "findings": 946,
-    "fit": 2965,
+    "fit": 2937,
     "library": 71,
-    "recordings": 4882,
-    "report": 2071,
-    "rig": 2238,
+    "recordings": 4863,
+    "report": 2057,
+    "rig": 2222,
     "rigs": 139,
-    "simulation": 1095,
+    "simulation": 1076,
     "studio": 663,
-    "sweeps": 817,
+    "sweeps": 812,
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 26688,
+    "tests": 26684,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -47,7 +47,7 @@ ASIDE = {
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 36052
+MOST = 35837
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Final
 
 import typer
@@ -56,20 +56,24 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.add_typer(rig_app, name="rig")
-app.add_typer(fit_app, name="fit")
-app.add_typer(design_app, name="design")
-app.command("completion")(completion_command)
-app.command("simulate")(simulate_command)
-app.command("effects")(effects_command)
-app.command("example")(example_command)
-app.command("import")(import_command)
-app.command("replay")(replay_command)
-app.command("size")(size_command)
-app.command("studio")(studio_command)
-app.command("compare")(compare_command)
-app.command("diagnose")(diagnose_command)
-for _group in (app, rig_app, fit_app, design_app):
+_GROUPS: Final = {"rig": rig_app, "fit": fit_app, "design": design_app}
+_COMMANDS: Final[dict[str, Callable[..., None]]] = {
+    "completion": completion_command,
+    "simulate": simulate_command,
+    "effects": effects_command,
+    "example": example_command,
+    "import": import_command,
+    "replay": replay_command,
+    "size": size_command,
+    "studio": studio_command,
+    "compare": compare_command,
+    "diagnose": diagnose_command,
+}
+for _name, _group in _GROUPS.items():
+    app.add_typer(_group, name=_name)
+for _name, _function in _COMMANDS.items():
+    app.command(_name)(_function)
+for _group in (app, *_GROUPS.values()):
     for _command in _group.registered_commands:
         _command.callback = _command.callback and with_quiet(_command.callback)
 

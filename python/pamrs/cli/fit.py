@@ -120,11 +120,6 @@ _Result = Annotated[Path | None, typer.Option(help=json_help(SCHEMA))]
 fit_app = typer.Typer(help="Fit models to measurements.")
 
 
-@fit_app.callback()
-def _root() -> None:
-    """Fit models to measurements."""
-
-
 @fit_app.command("muscle")
 def _muscle(
     context: typer.Context,
@@ -171,7 +166,19 @@ def _muscle(
         except FitError as error:
             raise FitError("; ".join([str(error), *inputs.data.notes])) from error
     contents: Contents = {
-        json: _muscle_document(fit, comparison, rubbing, context) if json else "",
+        json: _document(
+            SCHEMA,
+            fit.data,
+            context,
+            issues=fit.data.issues,
+            rows=len(fit.data),
+            friction=rubbing,
+            fit=fit,
+            leave_one_pressure_out=_left_out(fit)[0],
+            comparison=None if comparison is None else comparison.to_dicts(),
+        )
+        if json
+        else "",
         rig: fit.to_rig(inputs.rig).to_toml_text() if rig else "",
         png: fit.figure,
     }
@@ -519,23 +526,3 @@ def _document(schema: str, data: ForceMap, context: typer.Context, **found: Any)
     """A result with what it was made of."""
     made = {"name": data.label, "source": data.source, "command": _command(context)}
     return document(schema, **made, **found)
-
-
-def _muscle_document(
-    fit: MuscleFit,
-    comparison: ModelComparison | None,
-    friction: FrictionFit | None,
-    context: typer.Context,
-) -> str:
-    cross, _ = _left_out(fit)
-    return _document(
-        SCHEMA,
-        fit.data,
-        context,
-        issues=fit.data.issues,
-        rows=len(fit.data),
-        friction=friction,
-        fit=fit,
-        leave_one_pressure_out=cross,
-        comparison=None if comparison is None else comparison.to_dicts(),
-    )

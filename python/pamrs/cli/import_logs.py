@@ -17,7 +17,7 @@ from pamrs.cli._shared import Contents, check_new, exact, option, progress, rig_
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
-    from pamrs.recordings import LogProposal, Proposal
+    from pamrs.recordings import LogProposal
 
 _MOST_STEP: Final = 86_400.0
 """Longest spacing of samples [s]."""
@@ -81,7 +81,11 @@ def import_command(
     folder = out or Path()
     named, contents = _rig_beside(rig, folder, copy=copy, written=out is not None)
     if copies:
-        proposal = _moved(proposal, copies)
+        logs = [
+            replace(item, log=replace(item.log, path=copies.get(item.log.path, item.log.path)))
+            for item in proposal.logs
+        ]
+        proposal = replace(proposal, logs=logs)
     text = proposal.case_toml(folder, named)
     if file is None:
         typer.echo(text)
@@ -154,15 +158,6 @@ def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
             why = "the same log twice" if same else f"{other} has that name too; rename one"
             raise FileExistsError(f"{path}: {why}")
     return targets
-
-
-def _moved(proposal: Proposal, copies: dict[Path, Path]) -> Proposal:
-    """The same for logs at the places of their copies."""
-    logs = [
-        replace(item, log=replace(item.log, path=copies.get(item.log.path, item.log.path)))
-        for item in proposal.logs
-    ]
-    return replace(proposal, logs=logs)
 
 
 def _copy(copies: dict[Path, Path], folder: Path) -> None:

@@ -93,27 +93,22 @@ def _chosen(case: Case, name: str) -> list[Recording]:
 
 def _run(rig: Rig, recording: Recording) -> Simulation | None:
     """A free run; None, with the reason on standard error, where the rig cannot be run so."""
+    from pamrs.recordings import CHANNELS
     from pamrs.simulation import differences, replay
 
     try:
         run = replay(rig, recording)
         if not differences(run, recording):
+            there = [name for name in run if name != "time" and channel_of(name) in CHANNELS]
             typer.echo(
                 f"{recording.name}: {rig.name} has none of the channels that were recorded "
-                f"({', '.join(recording.channels)}); it has {', '.join(_measurable(run))}",
+                f"({', '.join(recording.channels)}); it has {', '.join(there)}",
                 err=True,
             )
         return run
     except (RecordingError, SimulationError) as error:
         typer.echo(f"{recording.name}: {rig.name} cannot be run: {error}", err=True)
         return None
-
-
-def _measurable(run: Simulation) -> list[str]:
-    """Channels of a run that a stand measures."""
-    from pamrs.recordings import CHANNELS
-
-    return [name for name in run if name != "time" and channel_of(name) in CHANNELS]
 
 
 def _lines(nominal: Simulation | None, own: Simulation | None, recording: Recording) -> list[str]:

@@ -115,9 +115,6 @@ class AdaptiveSliding(SlidingController):
             found[parameter.name] = value if rows == 1 else value[: value.size // rows]
         return found
 
-    def _start(self) -> dict[str, Any]:
-        return {parameter.name: parameter.value for parameter in self._parameters}
-
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """Desired gauge pressure [Pa] for a sample, within the arm's limits; see
         :meth:`pamrs.control.Controller.update`.

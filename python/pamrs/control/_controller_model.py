@@ -125,7 +125,11 @@ def linear_controller(
     commands = middle[n:]
     whole = np.array([slope for slope, _ in slopes]).T
     _refuse_deaf(update, whole, commands)
-    kept = _states(whole, n)
+    # states that reach a command and are moved by a measurement: an integral with a gain of zero is
+    # heard, but nothing moves it; it would count as a motion that never dies out
+    moved = heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
+    reach = np.abs(whole[n:, :n]).sum(axis=0)
+    kept = sorted(set(heard(whole[:n, :n], reach)) & set(moved))
     if side == "":
         _refuse_corners(update, inputs, [step for _, step in slopes], kept)
     read = _read(whole, n, kept) if whole_rig else list(range(len(inputs)))
@@ -156,15 +160,6 @@ def _refuse_deaf(update: _Update, whole: Array, commands: Array) -> None:
             f"the controller answers {answered} whatever it measures: it is at a limit; give the "
             "state in which it holds the arm here"
         )
-
-
-def _states(whole: Array, n: int) -> list[int]:
-    """Those of n states that reach a command and are moved by a measurement: an integral with a
-    gain of zero is heard, but nothing moves it; it would count as a motion that never dies out.
-    """
-    moved = heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
-    reach = np.abs(whole[n:, :n]).sum(axis=0)
-    return sorted(set(heard(whole[:n, :n], reach)) & set(moved))
 
 
 def _read(whole: Array, n: int, kept: list[int]) -> list[int]:

@@ -105,23 +105,13 @@ def fuzzy_surface(
     places = np.broadcast_arrays(
         (np.clip(error, -1.0, 1.0) + 1.0) * 3.0, (np.clip(rate, -1.0, 1.0) + 1.0) * 3.0
     )
-    return _surface(places[0], places[1], rules_array)
-
-
-def _surface(x: Array, y: Array, rules_array: Array) -> Array:
-    """The same for arrays of places among the sets, 0 to 6."""
-    i, j = np.minimum(x.astype(np.intp), 5), np.minimum(y.astype(np.intp), 5)
-    a, b = x - i, y - j
-    na, nb = 1.0 - a, 1.0 - b
-    p00, p01, p10, p11 = np.minimum(na, nb), np.minimum(na, b), np.minimum(a, nb), np.minimum(a, b)
-    w00, w01, w10, w11 = p00 * (2.0 - p00), p01 * (2.0 - p01), p10 * (2.0 - p10), p11 * (2.0 - p11)
-    total = (
-        w00 * rules_array[i, j]
-        + w01 * rules_array[i, j + 1]
-        + w10 * rules_array[i + 1, j]
-        + w11 * rules_array[i + 1, j + 1]
-    )
-    return np.asarray(total / (w00 + w01 + w10 + w11))
+    k, n = (np.minimum(place.astype(np.intp), 5) for place in places)
+    p, q = places[0] - k, places[1] - n
+    premises = np.minimum(1.0 - p, 1.0 - q), np.minimum(1.0 - p, q), np.minimum(p, 1.0 - q)
+    weights = [premise * (2.0 - premise) for premise in (*premises, np.minimum(p, q))]
+    corners = ((k, n), (k, n + 1), (k + 1, n), (k + 1, n + 1))
+    total = sum(w * rules_array[at] for w, at in zip(weights, corners, strict=True))
+    return np.asarray(total / sum(weights))
 
 
 class Fuzzy(OutputFeedback):

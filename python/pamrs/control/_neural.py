@@ -170,8 +170,7 @@ class Neural(SlidingController):
             rows, still = angle.ravel(), np.zeros(angle.size)
 
             def own(torque: Value, k: int = k) -> Array:
-                found: Array = np.asarray(torque).reshape(joints, nodes)[k]
-                return found
+                return np.asarray(np.reshape(torque, (joints, nodes))[k])
 
             c1, c2 = (own(value) for value in arm.torque.at(rows))
             held = own(arm.inverse_dynamics(rows, still, still, still))

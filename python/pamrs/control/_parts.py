@@ -211,8 +211,7 @@ class JointSensor(Stateful):
     ) -> None:
         self.measured_rate = bool(measured_rate)
         self.low_pass = LowPass(angle_filter, period)
-        self.slope: LowPass | FilteredDerivative
-        self.slope = (
+        self.slope: LowPass | FilteredDerivative = (
             LowPass(rate_filter, period)
             if measured_rate
             else FilteredDerivative(rate_filter, period)

@@ -226,7 +226,7 @@ class Recruitment(Share):
         add = _both(wanted > active, settled)
         drop = _both(calm >= self.dwell, settled)
         changed = where(add, wanted, where(drop, fewer, active))
-        self._waited = where(_either(add, drop), 0.0, waited)
+        self._waited = where(add, 0.0, where(drop, 0.0, waited))
         self._calm = where(drop, 0.0, calm)
         self._active = changed
         pressure = needed[0]
@@ -253,10 +253,6 @@ class Recruitment(Share):
 
 def _both(a: Any, b: Any) -> Any:
     return (a and b) if isinstance(a, bool) and isinstance(b, bool) else np.logical_and(a, b)
-
-
-def _either(a: Any, b: Any) -> Any:
-    return (a or b) if isinstance(a, bool) and isinstance(b, bool) else np.logical_or(a, b)
 
 
 def _count(needed: Sequence[Value], most: Value, least: int) -> Value:

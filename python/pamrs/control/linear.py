@@ -239,7 +239,10 @@ def linearise(
     """
     one_of("side", side, SIDES)
     one_of("friction", friction, FRICTIONS)
-    constant = _held_supplies(rig) if held is None else held
+    constant = held
+    if constant is None:  # what changes slowly, or not by a command
+        slow = rig.tables("supply").keys() - direct_regulators(rig)
+        constant = tuple(dotted("supply_pressure", name) for name in slow)
 
     def is_held(name: str) -> bool:
         return name in constant or channel_of(name) in constant
@@ -247,7 +250,14 @@ def linearise(
     moving = [name for name in rig.tables("supply") if not is_held(dotted("supply_pressure", name))]
     check_smooth(rig, supplies=bool(moving))
     rig = resting(without_dry_friction(rig) if friction == "moving" else rig)
-    start = _start(rig, angle, joint, chamber, initial)
+    if angle is None and not initial:
+        raise ParameterError(
+            "angle is missing: give the angle that the rig holds, or initial values that hold it "
+            "(RigController.holding)"
+        )
+    start = dict(initial or {})
+    if angle is not None:
+        start = equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
     simulator = Simulator(rig, sample_time=SAMPLE, initial=start)
     first = simulator.observe()
     commands = {**closed(rig), **kept(rig, first)}
@@ -255,7 +265,11 @@ def linearise(
     (states, inputs, outputs), (a, b, c) = core_rig(rig).linearise(start, side)
     free = [k for k, name in enumerate(states) if not is_held(name)]
     read = [k for k, name in enumerate(outputs) if not is_held(name)]
-    driving = _driving(inputs, moving)
+    driving = [  # all inputs but regulators whose pressure is held
+        k
+        for k, name in enumerate(inputs)
+        if channel_of(name) != "supply_command" or name.partition(".")[2] in moving
+    ]
     inputs = [inputs[k] for k in driving]
     a, b, c = a[np.ix_(free, free)], b[np.ix_(free, driving)], c[np.ix_(read, free)]
     named = [row for row, k in enumerate(free) if states[k] in outputs]
@@ -268,33 +282,6 @@ def linearise(
     return LinearModel(
         a[np.ix_(used, used)], b[used], c[:, used], *names, {**first, **commands}, side
     )
-
-
-def _start(
-    rig: Rig,
-    angle: float | None,
-    joint: str,
-    chamber: str,
-    initial: Mapping[str, float] | None,
-) -> dict[str, float]:
-    """The operating point: what holds an angle, or the initial values themselves."""
-    if angle is not None:
-        return equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
-    if not initial:
-        raise ParameterError(
-            "angle is missing: give the angle that the rig holds, or initial values that hold it "
-            "(RigController.holding)"
-        )
-    return dict(initial)
-
-
-def _driving(inputs: Sequence[str], moving: Sequence[str]) -> list[int]:
-    """Indices of the inputs that drive a rig: all but regulators whose pressure is held."""
-    return [
-        k
-        for k, name in enumerate(inputs)
-        if channel_of(name) != "supply_command" or name.partition(".")[2] in moving
-    ]
 
 
 def _check_driven(
@@ -315,14 +302,6 @@ def _said(kind: str, names: Collection[str]) -> str:
     if known:
         return f"{kind} {', '.join(known)}"
     return f"one {kind}" if names else f"no {kind}"
-
-
-def _held_supplies(rig: Rig) -> tuple[str, ...]:
-    """Supplies that change slowly, or not by a command: all but regulators without a valve."""
-    direct = direct_regulators(rig)
-    return tuple(
-        dotted("supply_pressure", name) for name in rig.tables("supply") if name not in direct
-    )
 
 
 def _check_rest(rig: Rig, simulator: Simulator, commands: Mapping[str, float]) -> None:

@@ -18,7 +18,7 @@ import time as _time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import FrameType
-from typing import Any, Final, NoReturn, Protocol, Self
+from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
@@ -490,19 +490,9 @@ class Termination:
         for number, handler in self._old.items():
             signal.signal(number, handler)
 
-    def check(self) -> None:
-        """Raise for a signal that came while it was not armed."""
-        if self.late is not None:
-            number, self.late = self.late, None
-            self._raise(number)
-
     def _came(self, number: int, frame: FrameType | None) -> None:
         if not self.armed:
             self.late = number
             return
         self.armed = False
-        self._raise(number)
-
-    @staticmethod
-    def _raise(number: int) -> NoReturn:
         raise KeyboardInterrupt if number == signal.SIGINT else SystemExit(128 + number)

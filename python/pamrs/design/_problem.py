@@ -282,13 +282,16 @@ class JointProblem:
         area_tolerance : float
             Share of the work wanted that may be missing [1].
         """
+        from scipy.integrate import cumulative_trapezoid
+
         highest = min(self.max_contraction, self.muscle.contraction_limits[1])
         contraction = np.linspace(0.0, highest, 2001)
         length = float(self.muscle.parameters["rest_length"])
         passive = self.muscle.force(0.0, contraction)
         slope = (self.muscle.force(self.pressure, contraction) - passive) / self.pressure
         work, work_slope = (
-            _running_integral(contraction * length, values) for values in (passive, slope)
+            cumulative_trapezoid(values, contraction * length, initial=0)
+            for values in (passive, slope)
         )
         possible = work_slope > 0.0
         needed = (
@@ -370,8 +373,3 @@ def _areas(angles: Array, excess: Array) -> tuple[Array, Array]:
         whole = 0.5 * (side[:, :-1] + side[:, 1:])
         parts.append(np.where(crossing, whole * (side[:, :-1] + side[:, 1:]) / share, whole) @ step)
     return parts[0], parts[1]
-
-
-def _running_integral(x: Array, y: Array) -> Array:
-    """Trapezoidal integral from the first point to each."""
-    return np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x))])

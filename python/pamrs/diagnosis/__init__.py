@@ -60,7 +60,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
 from pamrs.findings import MOST_MISSED, Answer, Limit, MissingInput, NextExperiment, beyond
-from pamrs.recordings import Case, Recording, is_table, load_case
+from pamrs.recordings import Case, is_table, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig, regulators_of
 
@@ -285,7 +285,8 @@ def _answer(
     doubts = ready.doubts if read is None else []
     warnings = [*inner.losses.told, *ready.suspected, *doubts, *begun, *ready.told]
     warnings += [*diagnosis.warnings, *ready.masked, *moved]
-    found = _as_found(case, inner, outer)
+    own = {p.recording.name: p.recording.parameters for p in (*inner.recordings, *outer.recordings)}
+    found = [replace(r, parameters=own.get(r.name, r.parameters)) for r in case.recordings]
     data = data_used(found, counts, inner.blocks, case.rig, inner.core, unjudged)
     return replace(diagnosis, warnings=warnings, data=data)
 
@@ -311,12 +312,6 @@ def _recorded(case: Any, data: Any, *, allow_outside: bool) -> Case:
     return case if isinstance(case, Case) else load_case(case, allow_outside=allow_outside)
 
 
-def _as_found(case: Case, *problems: Problem) -> list[Recording]:
-    """The recordings of a case with the values that were found of each."""
-    found = {p.recording.name: p.recording.parameters for own in problems for p in own.recordings}
-    return [replace(r, parameters=found.get(r.name, r.parameters)) for r in case.recordings]
-
-
 def _physics(
     case: Case, inner: Problem, outer: Problem, unjudged: list[Unjudged], say: Steps
 ) -> tuple[Diagnosis, Problem, list[Unjudged]]:
@@ -336,7 +331,8 @@ def _physics(
     if unsettled:
         groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
     say("putting the answer together", _JUDGED[1])
-    unjudged = [*unjudged, *_lost(every, inner)]
+    kept, failed = {block.name for block in inner.blocks}, "its judgement failed"
+    unjudged += [Unjudged(b.name, b.covers, failed) for b in every if b.name not in kept]
     found = conclude(case.rig, inner, outer, groups)
     diagnosis = assemble(case, inner, outer, groups, found, unjudged)
     proposal = inner.losses.part(
@@ -531,12 +527,6 @@ def _judged_only(
         raise DiagnosisError("; ".join(inner.losses.told))
     kept = replace(inner, blocks=[b for b in inner.blocks if b.name in judged])
     return kept, kept if outer is inner else replace(outer, blocks=kept.blocks)
-
-
-def _lost(every: Sequence[Block], judged: Problem) -> list[Unjudged]:
-    """Blocks whose judgement failed."""
-    kept = {block.name for block in judged.blocks}
-    return [Unjudged(b.name, b.covers, "its judgement failed") for b in every if b.name not in kept]
 
 
 def _on_time(inner: Problem, outer: Problem, rig: Rig) -> tuple[Problem, Problem, list[str]]:

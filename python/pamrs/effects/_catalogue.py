@@ -43,11 +43,6 @@ def _form(told: dict[str, Any], meanings: dict[str, str], equation: str) -> Form
     )
 
 
-def _same_data(told: dict[str, Any], words: dict[str, Any]) -> SameData:
-    held = tuple((name, value) for name, value in told["held"])
-    return SameData(**{**told, "held": held, "told_by": words["told_by"]})
-
-
 #: Of an effect, as the core tells it.
 _OF_CORE: Final = ("block", "at", "last_only", "on_loads", "frees_mass", "dry_friction")
 
@@ -73,7 +68,12 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         forms=tuple(_form(form, meanings, equations[form["name"]]) for form in told["forms"]),
         reference=told["source"],
         catalogue=told["named"],
-        same_data=tuple(_same_data(same, words) for same in told["same_data"]),
+        same_data=tuple(
+            SameData(
+                **{**same, "held": tuple(map(tuple, same["held"])), "told_by": words["told_by"]}
+            )
+            for same in told["same_data"]
+        ),
         terms=terms,
         excitation=tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in excitation),
         acts_in=tuple(told["acts_in"]),
@@ -93,11 +93,6 @@ def _info(told: dict[str, Any]) -> EffectInfo:
     )
 
 
-def _of_words(effect: str) -> Words:
-    words = _words(effect)
-    return Words(*(words[key] for key in ("what", "letter", "symbols", "odd_in")))
-
-
 EFFECTS: Final[dict[str, EffectInfo]] = {
     told["id"]: _info(told) for told in json.loads(_core.effects())
 }
@@ -114,7 +109,10 @@ CLOSURE_OF: Final[dict[str, str]] = {
     ("arm" if EFFECTS[name].at == "joint" else EFFECTS[name].at): name for name in CLOSURE_TERMS
 }
 """Sum of terms of each block of the cut chain."""
-WORDS: Final[dict[str, Words]] = {name: _of_words(name) for name in CLOSURE_TERMS}
+WORDS: Final[dict[str, Words]] = {
+    name: Words(*(_words(name)[key] for key in ("what", "letter", "symbols", "odd_in")))
+    for name in CLOSURE_TERMS
+}
 """How each sum of terms is put into words."""
 MEMORY_OF: Final[dict[str, str]] = {"time": "memory_time", "distance": "memory_angle"}
 """Shape that a term of a kind with memory depends on."""

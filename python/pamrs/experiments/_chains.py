@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from pamrs import _core
-from pamrs._arrays import Array, Mask
+from pamrs._arrays import Array, Mask, stretches
 from pamrs.channels import dotted
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
@@ -398,16 +398,6 @@ def _most(
     return [float(p) for p in said]
 
 
-def _mapped(rig: Rig, chain: Chain) -> list[float]:
-    """Highest pressures of the force maps of the muscles in the chamber of a chain [Pa, gauge]."""
-    muscles, own = rig.ports("muscle"), qualified("chamber", chain.chamber)
-    return [
-        float(table["map_pressure"][-1])
-        for name, table in rig.tables("muscle").items()
-        if table["model"] == "map" and muscles[name]["chamber"] == own
-    ]
-
-
 def top_of(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) -> float:
     """Highest pressure that a chain is moved to [Pa, gauge].
 
@@ -427,7 +417,12 @@ def top_of(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) 
     """
     said = _most(rig, chain, highest)
     if not said and not chain.valves:
-        said = _mapped(rig, chain)
+        muscles, own = rig.ports("muscle"), qualified("chamber", chain.chamber)
+        said = [  # the highest pressures of force maps
+            float(table["map_pressure"][-1])
+            for name, table in rig.tables("muscle").items()
+            if table["model"] == "map" and muscles[name]["chamber"] == own
+        ]
     if chain.valves:
         return min(0.8 * _source(rig, chain), *said, math.inf)
     if not said:
@@ -592,8 +587,7 @@ def _free(
     if not chain.moves or not free.any():
         return Range(0.1 * top, min(0.75 * top, 7.0e5) if not chain.moves else top)
     # the longest stretch: on its way up a joint may pass a place twice
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], free.astype(np.int8), [0]])))
-    a, b = max(zip(edges[::2], edges[1::2], strict=True), key=lambda ab: ab[1] - ab[0])
+    a, b = max(stretches(free), key=lambda ab: ab[1] - ab[0])
     low, high = float(pressure[a]), min(float(pressure[b - 1]), top)
     return Range(low, high) if high > 1.2 * low else Range(0.3 * top, top)
 

@@ -40,13 +40,15 @@ def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experimen
     """Fills of all chambers, shut off and left alone; where lines join several chambers, also of
     one, which then blows over into the others.
     """
-    chambers, segments, told = list(rig.tables("chamber")), _segments(rig), Told(rig)
+    chambers, told = list(rig.tables("chamber")), Told(rig)
+    segments = any(line.get("segments") for line in rig.tables("line").values())
+    outlets = any(ends["to"] == "ambient" for ends in rig.ports("line").values())
     out = []
     for row in [] if segments else rows("sealed"):  # waves would be followed for minutes
         pressure, seconds = span.at(row["at"]), row["seconds"]
         one = len(chambers) == 1
         filled, it, its = ("the chamber", "it", "its") if one else ("all chambers", "them", "their")
-        what = f"open {its} outlet" if _outlets(rig) else f"shut {it} off"
+        what = f"open {its} outlet" if outlets else f"shut {it} off"
         text = (
             f"fill {filled} to {told.each([in_bar(pressure)], 'bar')}, {what} and record "
             f"{seconds:g} s from that moment"
@@ -71,16 +73,6 @@ def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experimen
         step = max(_LEAST_SAMPLE_TIME, seconds / _MOST_BLOWN_SAMPLES)
         out.append(_left_alone(f"blow_over.{chamber}", text, begin, seconds, step))
     return out
-
-
-def _segments(rig: Rig) -> bool:
-    """Whether a tube of a rig carries waves."""
-    return any(line.get("segments") for line in rig.tables("line").values())
-
-
-def _outlets(rig: Rig) -> bool:
-    """Whether a line lets the air of a sealed rig out."""
-    return any(ends["to"] == "ambient" for ends in rig.ports("line").values())
 
 
 def _equalised(rig: Rig, begin: dict[str, float], joining: Collection[str]) -> float:

@@ -213,7 +213,8 @@ def compare_models(
     for name, order in pairs:
         blank = template(muscle, name, None if name != muscle.model else muscle.geometry, order)
         used = tuple(item for item in names if has_effect(item, name, blank.geometry))
-        spread = _of_model(tolerance or {}, name)
+        foreign = set(COEFFICIENTS) - set(ELASTIC_PARAMETERS[name])
+        spread = {key: value for key, value in (tolerance or {}).items() if key not in foreign}
         settings = {"model": name, "order": order, "free": used, "tolerance": spread, **shared}
         row, fit = _candidate(data, muscle, settings, levels)
         rows.append({**row, "geometry": blank.geometry, "free": list(used)})
@@ -224,12 +225,6 @@ def compare_models(
     rows = ranked + [row for row in rows if row["reason"] is not None]
     count = int(data.used.sum())
     return ModelComparison(rows, fits, size, count, subset, _loops(data, muscle, direction))
-
-
-def _of_model(tolerance: Mapping[str, float], model: str) -> dict[str, float]:
-    """What is known of the geometry, and of those coefficients that a model has."""
-    foreign = set(COEFFICIENTS) - set(ELASTIC_PARAMETERS[model])
-    return {key: value for key, value in tolerance.items() if key not in foreign}
 
 
 def _ranked(
@@ -254,7 +249,9 @@ def _ranked(
         fit = fits[row["model"], row["order"]]
         _, row["aicc"], row["bic"] = fit.criteria(size)
         row["rank"] = place
-        row["lopo_excess"], row["lopo_excess_stderr"] = _paired(_level_squares(fit) - least)
+        excess = _level_squares(fit) - least
+        row["lopo_excess"] = float(excess.mean())
+        row["lopo_excess_stderr"] = float(np.std(excess, ddof=1)) / math.sqrt(len(excess))
     # a candidate that fails at one level only has an excess of one standard error, however large
     near = _NEAR * ranked[0]["lopo_rms"]
     eligible = [r for r in ranked if r["lopo_excess"] <= r["lopo_excess_stderr"]]
@@ -300,11 +297,6 @@ def _level_squares(fit: MuscleFit) -> Array:
     """
     top = float(fit.data.force[fit.data.used].max())
     return fit.leave_one_pressure_out().level_squares() / top**2
-
-
-def _paired(difference: Array) -> tuple[float, float]:
-    """Mean over the levels and its standard error."""
-    return float(difference.mean()), float(np.std(difference, ddof=1)) / math.sqrt(len(difference))
 
 
 def _candidate(

@@ -109,7 +109,11 @@ class Design:
         each level.
         """
         if self.per_level:
-            levels = _level_names(self.knots)
+            knots = self.knots / 1e3
+            decimals = next(  # as many as tell them apart: 343.8kPa
+                d for d in range(1, 20) if len(set(np.round(knots, d).tolist())) == len(knots)
+            )
+            levels = [f"{round(pressure, decimals):.12g}kPa" for pressure in knots.tolist()]
             return tuple(f"{name}_{level}" for level in levels for name in self.base)
         if self.polynomial:
             return tuple(f"{letter}{name[1:]}" for letter in "mb" for name in self.base)
@@ -187,14 +191,6 @@ class Design:
         if self.polynomial:
             return blank.replace(modulus_slope=[0.0] * len(values), modulus_offset=values)
         return blank.replace(**dict(zip(self.base, values, strict=True)))
-
-
-def _level_names(knots: Array) -> list[str]:
-    """Pressures like ``343.8kPa``, with as many decimals as tell them apart."""
-    decimals = next(
-        d for d in range(1, 20) if len(set(np.round(knots / 1e3, d).tolist())) == len(knots)
-    )
-    return [f"{round(pressure / 1e3, decimals):.12g}kPa" for pressure in knots.tolist()]
 
 
 def _parts(

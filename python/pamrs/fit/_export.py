@@ -102,16 +102,14 @@ def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
     known = {
         name: given.tol
         for name, given in rig.parameters.items()
-        if given.tol > 0.0 and _kept(name, given.value, parameters)
+        if given.tol > 0.0
+        and not (
+            name.startswith("muscle.")
+            and parameters.get(name.removeprefix("muscle.")) != given.value
+        )
     }
     fitted = {f"muscle.{free.name}": fit.params[free.name].stderr for free in fit.free}
     return replace(rig, _model={**base, "muscle": parameters}, _tolerances={**known, **fitted})
-
-
-def _kept(name: str, value: float, muscle: Mapping[str, Any]) -> bool:
-    """Whether a number of the rig, by its dotted name, is the same with the fitted muscle in it."""
-    block, _, key = name.partition(".")
-    return block != "muscle" or muscle.get(key) == value
 
 
 def to_lmfit(params: Mapping[str, Any], covar: Array) -> Any:

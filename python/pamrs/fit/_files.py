@@ -99,7 +99,9 @@ def read_map(
     delimiter, table = _table(file, delimiter, decimal, columns)
     headings, lines = _calibrated(table, columns, source)
     found, strange = _understood(headings, lines, source)
-    decimal = decimal or decimal_of(_texts(table, found), source)
+    given = [table.cells(own.position) for name, own in found.items() if name != "direction"]
+    texts = [cells for cells in given if not isinstance(cells, np.ndarray)]
+    decimal = decimal or decimal_of(texts, source)
     wanted = {heading: str(value) for heading, value in (where or {}).items()}
     title = name or "_".join([stem_of(file), *wanted.values()])
     if "time" in found:
@@ -151,12 +153,6 @@ def read_map(
         row_numbers=np.asarray(table.row_numbers)[keep].tolist(),
         units={name: found[name].unit for name in measured if name in found},
     )
-
-
-def _texts(table: Table, found: Mapping[str, _Column]) -> list[Sequence[str]]:
-    """Cells of the columns with numbers, where they are text."""
-    columns = (table.cells(own.position) for name, own in found.items() if name != "direction")
-    return [cells for cells in columns if not isinstance(cells, np.ndarray)]
 
 
 def _table(

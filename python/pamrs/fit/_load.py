@@ -228,7 +228,7 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
     reader = Reader()
     reader.problems += problems_of("", document, _TOP, needed=("schema",))
     if "file" not in document:
-        reader.problem("file is missing: the table with the measurements")
+        reader.problems.append("file is missing: the table with the measurements")
     clipped = _quantity(reader, document, "clipped_force", "N")
     tolerance = _quantity(reader, document, "level_tolerance", "Pa")
     noise = _quantity(reader, document, "noise", "N")
@@ -239,7 +239,9 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
         if not reader.problems:
             reader.problems += muscle_problems("muscle", model, reader.units)
     else:
-        reader.problem("the block [muscle] is missing: the muscle's geometry, as in a rig file")
+        reader.problems.append(
+            "the block [muscle] is missing: the muscle's geometry, as in a rig file"
+        )
     if reader.problems:
         raise RecordingError(joined(str(file), reader.problems))
     texts = {key: document.get(key, "") for key, rule in _TOP.items() if rule.accepts is is_text}
@@ -286,6 +288,8 @@ def _quantity(reader: Reader, document: Mapping[str, Any], key: str, unit: str) 
         return None
     whole = isinstance(raw, Mapping) and set(raw) == {"value", "unit"}
     if not (whole and isinstance(raw["unit"], str)):
-        reader.problem(f"{key} = {raw!r} is not allowed: write {{ value = ..., unit = {unit!r} }}")
+        reader.problems.append(
+            f"{key} = {raw!r} is not allowed: write {{ value = ..., unit = {unit!r} }}"
+        )
         return None
     return reader.scalar(key, unit, raw["value"], raw["unit"], -1e9, 1e9)

@@ -293,6 +293,7 @@ def _predict(pressure: Array, contraction: Array, force: Array, gas: Array, e: A
 
 def _table(pressure: Array, contraction: Array, gas: Array, e: Array, pull: Array) -> Array:
     """Forces at the nodes, monotone along both axes."""
+    from scipy.optimize import isotonic_regression
     from scipy.sparse import csr_array, eye_array, kron
     from scipy.sparse.linalg import spsolve
 
@@ -312,9 +313,9 @@ def _table(pressure: Array, contraction: Array, gas: Array, e: Array, pull: Arra
     found = np.asarray(spsolve(normal.tocsc(), design.T @ pull)).reshape(len(pressure), count)
     seen = np.asarray(design.sum(axis=0)).reshape(found.shape)
     trust = np.maximum(seen.mean(axis=0), 1e-3 * seen.mean())
-    falling = np.array([-_isotonic(-row, trust) for row in found])
+    falling = np.array([-isotonic_regression(-row, weights=trust).x for row in found])
     trust = np.maximum(seen.mean(axis=1), 1e-3 * seen.mean())
-    return np.column_stack([_isotonic(column, trust) for column in falling.T])
+    return np.column_stack([isotonic_regression(row, weights=trust).x for row in falling.T])
 
 
 def _place(axis: Array, values: Array) -> tuple[Index, Array]:
@@ -336,23 +337,6 @@ def _second(axis: Array) -> Any:
         line[k] = -line[k - 1] - line[k + 1]
         lines.append(line)
     return csr_array(np.array(lines).reshape(len(lines), len(axis)))
-
-
-def _isotonic(values: Array, weights: Array) -> Array:
-    """The rising values nearest to some values, by pooled adjacent violators."""
-    means: list[float] = []
-    sizes: list[float] = []
-    counts: list[int] = []
-    for value, weight in zip(values.tolist(), weights.tolist(), strict=True):
-        means.append(value)
-        sizes.append(weight)
-        counts.append(1)
-        while len(means) > 1 and means[-2] > means[-1]:
-            total = sizes[-2] + sizes[-1]
-            means[-2:] = [(means[-2] * sizes[-2] + means[-1] * sizes[-1]) / total]
-            sizes[-2:] = [total]
-            counts[-2:] = [counts[-2] + counts[-1]]
-    return np.repeat(means, counts)
 
 
 def _branches(way: NDArray[np.int8]) -> list[Mask]:

@@ -230,7 +230,8 @@ def _tolerances(tolerance: Mapping[str, float] | None) -> dict[str, float]:
 
 def _known(muscle: Muscle, blank: Muscle, tolerance: Mapping[str, float]) -> dict[str, Known]:
     """Priors of the coefficients: around the muscle's own values where it has the same kind."""
-    own = muscle.parameters if muscle.model in (blank.model, *_alike(blank.model)) else {}
+    same = {blank.model, muscle.model} <= set(POLYNOMIAL_MODELS) or muscle.model == blank.model
+    own = muscle.parameters if same else {}
     known: dict[str, Known] = {}
     for name in (name for name in COEFFICIENTS if math.isfinite(tolerance.get(name, math.inf))):
         if name not in ELASTIC_PARAMETERS[blank.model]:
@@ -241,11 +242,6 @@ def _known(muscle: Muscle, blank: Muscle, tolerance: Mapping[str, float]) -> dic
         values = np.atleast_1d(own.get(name, 0.0)).tolist()
         known[name] = Known(tuple(values), float(tolerance[name]))
     return known
-
-
-def _alike(model: str) -> tuple[str, ...]:
-    """The models whose coefficients mean the same: those with a stress polynomial."""
-    return POLYNOMIAL_MODELS if model in POLYNOMIAL_MODELS else ()
 
 
 def _problem(

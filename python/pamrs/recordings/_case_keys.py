@@ -26,14 +26,6 @@ def _is_flag(value: Any) -> bool:
     return isinstance(value, bool)
 
 
-def _is_character(value: Any) -> bool:
-    return isinstance(value, str) and len(value) == 1
-
-
-def _is_full_list(value: Any) -> bool:
-    return isinstance(value, list) and len(value) > 0
-
-
 TOP: Final[dict[str, Rule]] = {
     "schema": Rule(_one_of(SCHEMA), repr(SCHEMA)),
     "name": Rule(is_text, "a text", "default: that of the folder"),
@@ -60,7 +52,11 @@ ENTRY: Final[dict[str, Rule]] = {
         "a list of headings, or a table from headings to headings",
         "what each column is: 'name [unit]'",
     ),
-    "delimiter": Rule(_is_character, "one character", "between columns"),
+    "delimiter": Rule(
+        lambda value: isinstance(value, str) and len(value) == 1,
+        "one character",
+        "between columns",
+    ),
     "header": Rule(_is_flag, "true or false", "whether the first line has headings"),
     "thousands": Rule(
         holds((str, Mapping), is_text),
@@ -78,7 +74,7 @@ ENTRY: Final[dict[str, Rule]] = {
         "more seconds) or column (a series that changes)",
     ),
     "pieces": Rule(
-        _is_full_list,
+        lambda value: isinstance(value, list) and len(value) > 0,
         "a list of numbers or texts of parts",
         "which parts, counted from 1, or their texts",
     ),

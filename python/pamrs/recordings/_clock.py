@@ -225,14 +225,8 @@ def usual_interval(forward: Array, count: int) -> float:
         Seconds.
     """
     usual = float(np.median(forward))
-    return _plain(float(np.mean(forward[forward < GAP * usual])), count)
-
-
-def _plain(interval: float, count: int) -> float:
-    """The interval in few digits if that does not shift the grid visibly over the whole
-    recording.
-    """
-    short = float(f"{interval:.4g}")
+    interval = float(np.mean(forward[forward < GAP * usual]))
+    short = float(f"{interval:.4g}")  # unless that shifts the grid visibly over all of it
     if abs(short / interval - 1.0) * count < 0.5 * _ON_SAMPLE:
         return short
     return float(f"{interval:.9g}")

@@ -62,7 +62,12 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
     if len(data) < 3:
         return []
     if np.all(data == data[0]):
-        return _constant(channel, data, good)
+        masked, text = (
+            row.has("clips") and not row.has("steady"),
+            "one and the same value throughout",
+        )
+        whole = Fault("constant", int(good[0]), int(good[-1]) + 1, text, masked)
+        return [whole] if len(data) >= _LEAST else []
     faults = _rails(data, good)
     for fault in faults:
         good = good[(good < fault.start) | (good >= fault.stop)]
@@ -83,14 +88,6 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
         cut_off = kind == "saturated"
         faults.append(found._replace(rail=float(data[start])) if cut_off else found)
     return faults
-
-
-def _constant(channel: str, data: Array, good: Index) -> list[Fault]:
-    if len(data) < _LEAST:
-        return []
-    masked = CHANNELS[channel].has("clips") and not CHANNELS[channel].has("steady")
-    text = "one and the same value throughout"
-    return [Fault("constant", int(good[0]), int(good[-1]) + 1, text, masked)]
 
 
 def _rails(data: Array, good: Index) -> list[Fault]:
@@ -269,5 +266,4 @@ def _skipped_reversals(signs: Array) -> Index:
     """Reversals across one or two equal samples: up, still, down."""
     one = (signs[:, 2:] * signs[:, :-2] < 0) & (signs[:, 1:-1] == 0)
     two = (signs[:, 3:] * signs[:, :-3] < 0) & (signs[:, 2:-1] == 0) & (signs[:, 1:-2] == 0)
-    total: Index = np.sum(one, axis=1) + np.sum(two, axis=1)
-    return total
+    return np.asarray(np.sum(one, axis=1) + np.sum(two, axis=1))

@@ -311,7 +311,9 @@ def _proposal(
     made = {match.channel: clocks.of(match.series) for match in matches}
     known = {name: clock for name, clock in made.items() if clock is not None}
     laid = {
-        m.channel: sampled(m.channel, m.si(), known[m.channel], _unit(m))
+        m.channel: sampled(
+            m.channel, m.si(), known[m.channel], "rad" if same_dimension(m.unit, "rad") else ""
+        )
         for m in matches
         if m.channel in known
     }
@@ -375,10 +377,6 @@ def _unused(names: list[str]) -> list[str]:
     more = f" and {len(names) - _MOST_UNUSED} more" if len(names) > _MOST_UNUSED else ""
     told = f"{', '.join(names[:_MOST_UNUSED])}{more}"
     return [f"not used: {told}; where one is a channel of the rig, name it in case.toml"]
-
-
-def _unit(match: Match) -> str:
-    return "rad" if same_dimension(match.unit, "rad") else ""
 
 
 def _spoken(channel: str, rig: Rig) -> str:

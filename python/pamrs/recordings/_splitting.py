@@ -165,7 +165,8 @@ def stretches_of(cut: Cut, time: Array, column: Split | None) -> list[Stretch]:
         Those that have a label, counted from 1.
     """
     if column is not None:
-        begins = _differ(column.values)
+        before, after = column.values[:-1], column.values[1:]
+        begins = (after != before) & ~(np.isnan(after) & np.isnan(before))
     else:
         steps = np.diff(time)
         begins = steps < 0.0 if cut.gap is None else steps > cut.gap
@@ -179,12 +180,6 @@ def stretches_of(cut: Cut, time: Array, column: Split | None) -> list[Stretch]:
 
 def _clock_of(item: Sampled) -> Ticks:
     return item.clock or Ticks(np.arange(len(item.time)), item.time)
-
-
-def _differ(values: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Where the next value is another one; NaN is equal to NaN."""
-    both = np.isnan(values[1:]) & np.isnan(values[:-1])
-    return np.asarray((values[1:] != values[:-1]) & ~both)
 
 
 def _labels(column: Split, starts: Sequence[int]) -> list[str]:

@@ -311,10 +311,6 @@ def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
     return shown, len(groups) - len(shown)
 
 
-def _first(diagnosis: Findings) -> Markup | None:
-    return _curves(figures.free_panels(diagnosis), "free")
-
-
 def _missing(diagnosis: Findings) -> str | None:
     """The missing input, where there is one."""
     found = diagnosis.missing_input
@@ -412,7 +408,7 @@ def render(diagnosis: Findings) -> str:
 _PICTURES: Final[dict[str, Callable[[Findings], str | None]]] = {
     "chain": chain_svg,
     "missing": _missing,
-    "first": _first,
+    "first": lambda diagnosis: _curves(figures.free_panels(diagnosis), "free"),
     "separating": _separating,
 }
 _TABLES: Final[dict[str, Callable[[Findings], list[Any]]]] = {

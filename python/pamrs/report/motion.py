@@ -97,7 +97,10 @@ def write_channels(
             axes.set_title(title)
             axes.set_ylabel(laboratory_unit(names[0])[0])
             if len(axes.lines) > 1:
-                _legend_above(axes)
+                place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
+                axes.legend(
+                    ncols=6, borderaxespad=0.1, handlelength=1.8, columnspacing=1.3, **place
+                )
         rows[-1].set_xlabel("time [s]")
         return write_atomically(path, png_bytes(figure))
 
@@ -131,7 +134,13 @@ def _draw_channel(
             alpha=0.6,
             label="_" if "recorded" in told else "recorded",
         )
-    beside = nominal if nominal is not None and name in nominal and _answers(head) else None
+    beside = (
+        nominal
+        if nominal is not None
+        and name in nominal
+        and head not in ("valve_command", "supply_command")
+        else None
+    )
     if beside is not None:
         time, value = decimate(beside.time, factor * beside[name])
         axes.plot(
@@ -151,11 +160,6 @@ def _draw_channel(
         lw=1.3,
         label=f"{label} {'simulated' if beside is None else 'model'}".strip(),
     )
-
-
-def _answers(head: str) -> bool:
-    """Whether a channel is what a rig does, and not what it is told to do."""
-    return head not in ("valve_command", "supply_command")
 
 
 def _of(result: Simulation, heads: tuple[str, ...]) -> list[str]:
@@ -352,9 +356,3 @@ class _Scene:
         )
         self.text.set_text(f"{self.result.time[row]:.2f} s    {said}    {bars} bar")
         return self.arm, self.payload, self.text, *(group.line for group in self.groups)
-
-
-def _legend_above(axes: Axes) -> None:
-    """Legend in one line above the axes, flush right."""
-    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
-    axes.legend(ncols=6, borderaxespad=0.1, handlelength=1.8, columnspacing=1.3, **place)

@@ -60,7 +60,8 @@ def summary(diagnosis: Findings) -> str:
     for instruction in story.to_do(diagnosis):
         lines += _wrapped(f"On the bench: {instruction}")
     lines += _next(diagnosis)
-    lines += _data(diagnosis)
+    rests = words.data_sentence(diagnosis)
+    lines += ["", *_wrapped(rests)] if rests else []
     for warning in diagnosis.warnings[:3]:
         lines += _wrapped(f"Warning: {warning}")
     if len(diagnosis.warnings) > 3:
@@ -120,12 +121,6 @@ def _budget(diagnosis: Findings) -> list[str]:
     note = "" if plain else f"({words.BUDGET_NOTE})"
     lines += textwrap.wrap(note, 96, initial_indent="  ", subsequent_indent="  ")
     return ["", *lines] if lines else []
-
-
-def _data(diagnosis: Findings) -> list[str]:
-    """What the answer rests on, and what of it was not used."""
-    told = words.data_sentence(diagnosis)
-    return ["", *_wrapped(told)] if told else []
 
 
 def _next(diagnosis: Findings) -> list[str]:

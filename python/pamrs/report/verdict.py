@@ -55,7 +55,11 @@ def verdict(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) 
     if first and first == without[:1]:  # what has no name leads
         main, unexplained = [unexplained, *main], ""
     healthy = [p for p in answer.parts if not p.names and p not in without]
-    main += [_may_be_complete(part) for part in healthy]
+    main += [
+        f"The {spoken_name(p.block or 'rig')} may lack nothing "
+        f"(probability {format_probability(p.probability)})."
+        for p in healthy
+    ]
     main += [diagnosis.where.text] if first and first == healthy[:1] else []
     main = [*main, *still] if answer.named else [*still, *main]
     main.append(unsettled_sentence(diagnosis))
@@ -79,12 +83,6 @@ def _healthy(diagnosis: Findings) -> str:
         f"tolerances the model predicts {judged} {down_to(diagnosis)}."
         + (f" Moved most: {moved}." if moved else "")
     )
-
-
-def _may_be_complete(part: Part) -> str:
-    """A group that may lack nothing, where that is open."""
-    chance = format_probability(part.probability)
-    return f"The {spoken_name(part.block or 'rig')} may lack nothing (probability {chance})."
 
 
 def _opening(diagnosis: Findings, named: Sequence[EffectFound | WrongParameter], claim: str) -> str:

@@ -65,7 +65,7 @@ def read_model_error(reader: Reader, raw: Any, model: Mapping[str, Any]) -> dict
         block, own = ERROR_CHANNELS.get(kind, kind), name.partition(".")[2]
         tables = tables_of(model, block)
         if not tables or (own and own not in tables):
-            reader.problem(
+            reader.problems.append(
                 f"model_error.{name} is not allowed: the rig has no {qualified(block, own)}"
             )
             continue

@@ -162,10 +162,6 @@ class _Connector:
         self.ports: Ports = {block: {name: {} for name in self.tables[block]} for block in PORTS}
         self.problems: list[str] = []
 
-    def note(self, text: str) -> None:
-        """Note something wrong."""
-        self.problems.append(text)
-
     # --------------------------------------------------------------------- one port
 
     def settle(
@@ -196,13 +192,15 @@ class _Connector:
         if len(short) == 1:
             return short[0]
         if short:
-            self.note(f"{label} = {text!r} is not clear: {' or '.join(short)}")
+            self.problems.append(f"{label} = {text!r} is not clear: {' or '.join(short)}")
         elif text in ("ambient", "base", *self.all_of(BLOCKS)):
-            self.note(f"{label} = {text!r} is not allowed: one of {', '.join(allowed)}")
+            self.problems.append(f"{label} = {text!r} is not allowed: one of {', '.join(allowed)}")
         else:
             short = [name for kind in port.kinds for name in self.tables[kind] if name]
             what = " and no ".join([*port.kinds, *port.words])
-            self.note(f"{label} = {text!r} names no {what}{near_name(text, allowed, short)}")
+            self.problems.append(
+                f"{label} = {text!r} names no {what}{near_name(text, allowed, short)}"
+            )
         return None
 
     def missing(self, label: str, port: str, kinds: list[str]) -> None:
@@ -212,12 +210,12 @@ class _Connector:
         if there:
             unfed = label.partition(".")[0] == "line" and port == "from" and self.tables["valve"]
             other = ", or lead a valve to it" if unfed else ""
-            self.note(
+            self.problems.append(
                 f"{label}.{port} is missing: the rig has {' and '.join(there)}; say which{other}"
             )
         else:
             needed = " or ".join(f"[{kind}]" for kind in kinds)
-            self.note(f"the block [{label}] needs the block {needed}, which is missing")
+            self.problems.append(f"the block [{label}] needs the block {needed}, which is missing")
 
     def all_of(self, kinds: Iterable[str]) -> list[str]:
         """Blocks of some kinds in full."""
@@ -232,13 +230,10 @@ class _Connector:
         ``of``, not another's partner.
         """
         names = list(self.tables[kind] if among is None else among)
-        if len(names) != 1 or (of and names[0] and names[0] != of and self._partnered(names[0])):
+        partners = {*self.tables["valve"], *self.tables["muscle"]}
+        if len(names) != 1 or (of and names[0] and names[0] != of and names[0] in partners):
             return ""
         return qualified(kind, names[0])
-
-    def _partnered(self, name: str) -> bool:
-        """Whether a valve or a muscle has this name: blocks of the same name belong together."""
-        return name in self.tables["valve"] or name in self.tables["muscle"]
 
     # ------------------------------------------------------------------------- air
 
@@ -249,19 +244,21 @@ class _Connector:
             if "inlet" not in self.given.get(label, {}):
                 continue
             if (kind := kind_of("supply", table)) != "regulator":
-                self.note(f"{label}.inlet is not allowed with {kind!r}: only with regulator")
+                self.problems.append(
+                    f"{label}.inlet is not allowed with {kind!r}: only with regulator"
+                )
                 continue
             front = self.settle("supply", name, "inlet", ())
             if front is None:
                 continue
             other = self.tables["supply"][bare("supply", front)]
             if front == label:
-                self.note(
+                self.problems.append(
                     f"{label}.inlet = {front!r} is not allowed: it is the regulator itself; "
                     "another supply is needed"
                 )
             elif kind_of("supply", other) == "regulator":
-                self.note(
+                self.problems.append(
                     f"{label}.inlet = {front!r} is not allowed: it is a regulator; a tank or a "
                     "constant supply is needed"
                 )
@@ -294,7 +291,7 @@ class _Connector:
             self.two_ends("valve", name, start, end)
             fed = next((line for line in own if qualified("line", line) == end), None)
             if fed is not None and own[fed] is not None:
-                self.note(
+                self.problems.append(
                     f"{qualified('valve', name)}.to = {end!r} is not allowed: {end}.from = "
                     f"{own[fed]!r}, so that no valve feeds it"
                 )
@@ -312,7 +309,7 @@ class _Connector:
                     self.ports["line"][name]["from"] = ""
                     # its pressure would have no rate
                     if kind_of("line", table) == "orifice" and table.get("inlet_volume") == 0.0:
-                        self.note(
+                        self.problems.append(
                             f"{label}.inlet_volume = 0 is not allowed: more is needed between "
                             "an orifice and the valves that feed it"
                         )
@@ -323,12 +320,12 @@ class _Connector:
             start = self.settle("line", name, "from", (self.same("supply", name), alone))
             self.two_ends("line", name, start, end)
             if start is not None and table.get("inlet_volume"):
-                self.note(
+                self.problems.append(
                     f"{label}.inlet_volume is not allowed: {label} begins at {start}, and only an "
                     "inlet that valves feed has a volume of its own"
                 )
             if start is not None and table.get("pressure_zero"):
-                self.note(
+                self.problems.append(
                     f"{label}.pressure_zero is not allowed: {label} begins at {start}, and only an "
                     "inlet that valves feed has a gauge"
                 )
@@ -336,7 +333,7 @@ class _Connector:
     def two_ends(self, block: str, name: str, start: str | None, end: str | None) -> None:
         """Note a valve or line that leads back to where it begins."""
         if start is not None and start == end:
-            self.note(
+            self.problems.append(
                 f"{qualified(block, name)}: from and to are both {start}; two different ends are "
                 "needed"
             )
@@ -357,21 +354,25 @@ class _Connector:
             )
             own = qualified("transmission", name)
             if joint == "load" and name in transmissions:
-                self.note(f"the block [{own}] is not allowed: {label} pulls on the load, straight")
+                self.problems.append(
+                    f"the block [{own}] is not allowed: {label} pulls on the load, straight"
+                )
             free = [
                 qualified("joint", j)
                 for j, table in self.tables["joint"].items()
                 if kind_of("joint", table) == "free"
             ]
             if joint in free and name not in transmissions:
-                self.note(f"{label} pulls on {joint}, which is free: the block [{own}] is missing")
+                self.problems.append(
+                    f"{label} pulls on {joint}, which is free: the block [{own}] is missing"
+                )
         for name in transmissions:
             if name not in self.tables["muscle"]:
                 whose = "without a name, as no muscle is: name it as its muscle"
                 if name:
                     hint = near_name(name, filter(None, self.tables["muscle"]))
                     whose = f"named after no muscle{hint}"
-                self.note(f"the block [{qualified('transmission', name)}] is {whose}")
+                self.problems.append(f"the block [{qualified('transmission', name)}] is {whose}")
 
     # ------------------------------------------------------------------------- arm
 
@@ -379,9 +380,11 @@ class _Connector:
         """Note blocks that need each other or exclude each other."""
         for block, needs in _NEEDS:
             if self.tables[block] and not self.tables[needs]:
-                self.note(f"the block [{block}] needs the block [{needs}], which is missing")
+                self.problems.append(
+                    f"the block [{block}] needs the block [{needs}], which is missing"
+                )
         if self.tables["load"] and (self.tables["joint"] or self.tables["arm"]):
-            self.note(
+            self.problems.append(
                 "the block [load] does not go with [joint] and [arm]: a rig has one or the others"
             )
 
@@ -390,23 +393,25 @@ class _Connector:
         links, joints = self.tables["link"], self.tables["joint"]
         kind = kind_of("arm", self.tables["arm"][""]) if self.tables["arm"] else None
         if links and not self.tables["arm"]:
-            self.note(
+            self.problems.append(
                 "the block [link] needs the block [arm] with kind = 'planar', which is missing"
             )
         if kind == "one_link":
             if links:
                 names = ", ".join(self.all_of(["link"]))
-                self.note(
+                self.problems.append(
                     f"arm.kind = 'one_link' is not allowed with {names}: 'planar' is needed for "
                     "links"
                 )
             if len(joints) > 1:
-                self.note(
+                self.problems.append(
                     f"arm.kind = 'one_link' is not allowed with the joints {', '.join(joints)}: "
                     "one joint, or 'planar' with a link each"
                 )
         elif kind == "planar" and not links:
-            self.note("arm.kind = 'planar' needs a block [link] for each joint, and there is none")
+            self.problems.append(
+                "arm.kind = 'planar' needs a block [link] for each joint, and there is none"
+            )
         elif kind == "planar":
             self.joints_of_links()
             self.chain()
@@ -418,7 +423,7 @@ class _Connector:
             label = qualified("link", name)
             joint = self.settle("link", name, "joint", (self.same("joint", name),))
             if joint in moved:
-                self.note(
+                self.problems.append(
                     f"{label}.joint = {joint!r} is not allowed: {joint} moves {moved[joint]} "
                     "already"
                 )
@@ -440,7 +445,7 @@ class _Connector:
             on = self.settle("link", name, "on", (before,))
             before = label
             if on in carries:
-                self.note(
+                self.problems.append(
                     f"{label}.on = {on!r} is not allowed: {on} carries "
                     f"{qualified('link', carries[on])} already"
                 )
@@ -454,7 +459,7 @@ class _Connector:
             place = qualified("link", carries[place])
         around = [qualified("link", name) for name in self.tables["link"] if name not in ordered]
         if around:
-            self.note(
+            self.problems.append(
                 f"{', '.join(around)}: each is on another of them, in a circle; one link of an arm "
                 "is on the base"
             )

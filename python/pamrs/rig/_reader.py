@@ -104,13 +104,9 @@ class Reader:
         self.own: list[str] = []
         self.whole = True  # every block could be told: what is connected to what can be checked
 
-    def problem(self, text: str) -> None:
-        """Note a problem."""
-        self.problems.append(text)
-
     def refuse(self, name: str, value: object, needed: str) -> None:
         """Note a value that is not allowed, and what is needed."""
-        self.problem(f"{name} = {_shown(value)} is not allowed: {needed}")
+        self.problems.append(f"{name} = {_shown(value)} is not allowed: {needed}")
 
     def unknown_keys(self, prefix: str, given: Iterable[str], allowed: Iterable[str]) -> None:
         """Note every key that is not allowed, with what is near to it."""
@@ -169,7 +165,7 @@ class Reader:
         """
         if raw is None:
             if block in REQUIRED_BLOCKS:
-                self.problem(f"the block [{block}] is missing")
+                self.problems.append(f"the block [{block}] is missing")
                 self.whole = False
             return None
         if not isinstance(raw, Mapping):
@@ -184,16 +180,18 @@ class Reader:
             self.whole = False
             named = ", ".join(f"[{block}.{name}]" for name in names)
             if block in SINGLE_BLOCKS:
-                self.problem(f"{named} is not allowed: a rig has one [{block}], without a name")
+                self.problems.append(
+                    f"{named} is not allowed: a rig has one [{block}], without a name"
+                )
             else:
-                self.problem(
+                self.problems.append(
                     f"[{block}] has {', '.join(others)} and {named}: either one [{block}] or "
                     "only named ones are needed"
                 )
             return None
         wrong = [name for name in names if not _NAME.fullmatch(name)]
         for name in wrong:
-            self.problem(
+            self.problems.append(
                 f"[{block}.{name!r}]: the name {name!r} is not allowed: letters, digits, _ and - "
                 "are needed"
             )
@@ -234,12 +232,14 @@ class Reader:
             if key in keys or _dig(table, key.where) is None:
                 continue
             if of_kind(block, table, key):
-                self.problem(
+                self.problems.append(
                     f"{label}.{key.name} is not allowed without {key.needs}: it is {key.note}"
                 )
             else:
                 kind, only = _shown(kind_for(block, table, key)), ", ".join(key.only)
-                self.problem(f"{label}.{key.name} is not allowed with {kind}: only with {only}")
+                self.problems.append(
+                    f"{label}.{key.name} is not allowed with {kind}: only with {only}"
+                )
         content = {key.name: self.value(label, key, _dig(table, key.where)) for key in keys}
         if content.get("geometry") == "":
             content["geometry"] = own_geometry(content["model"])
@@ -266,7 +266,7 @@ class Reader:
                 named = dict.fromkeys(
                     other for names in owners.values() for other in names if other
                 )
-                self.problem(
+                self.problems.append(
                     f"the block [sensors.{name}] is named after no chamber and no "
                     f"joint{near_name(name, named)}"
                 )
@@ -276,7 +276,7 @@ class Reader:
                     del table[key]
                     if key in raw[name]:
                         what = "chamber" if key == "pressure_zero" else "joint"
-                        self.problem(
+                        self.problems.append(
                             f"sensors.{name}.{key} is not allowed: the rig has no {what}.{name}"
                         )
 
@@ -314,7 +314,7 @@ class Reader:
                 needs = "it belongs in [sensors], without a name"
                 if not moves:
                     needs = 'a [load] with kind = "mass" is needed'
-                self.problem(f"{label}.length_zero is not allowed: {needs}")
+                self.problems.append(f"{label}.length_zero is not allowed: {needs}")
             table.pop("length_zero", None)
 
     # -------------------------------------------------------------------- values
@@ -326,7 +326,7 @@ class Reader:
         label = ".".join((block, *key.where))
         if raw is None:
             if key.default is None:
-                self.problem(f"{label} is missing")
+                self.problems.append(f"{label} is missing")
             return list(key.default) if isinstance(key.default, tuple) else key.default
         if key.kind == "choice":
             if raw not in key.choices:
@@ -347,7 +347,7 @@ class Reader:
         if whole:
             for word in ("tol", "unknown", "error"):
                 if extra.get(word):
-                    self.problem(f"{label}.{word} is not allowed: a count is known")
+                    self.problems.append(f"{label}.{word} is not allowed: a count is known")
             return int(value)
         self.spread(f"{block}.{key.name}", label, key, unit, extra)
         self.units.written.update({f"{block}.{key.name}": unit} if extra else {})
@@ -366,17 +366,17 @@ class Reader:
             return None, key.unit, {}
         self.unknown_keys(f"{label}.", raw, _QUANTITY)
         if "value" not in raw:
-            self.problem(f"{label}.value is missing")
+            self.problems.append(f"{label}.value is missing")
             return None, key.unit, {}
         unit = raw.get("unit")
         if not isinstance(unit, str):
-            self.problem(f"{label}.unit is missing: a unit like {key.unit!r} is needed")
+            self.problems.append(f"{label}.unit is missing: a unit like {key.unit!r} is needed")
             return None, key.unit, {}
         return raw["value"], unit, raw
 
     def no_unit(self, label: str, raw: Any, unit: str) -> None:
         """Note a number without the table that gives its unit."""
-        self.problem(
+        self.problems.append(
             f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {unit!r} }}"
         )
 
@@ -401,7 +401,7 @@ class Reader:
         try:
             value = to_si(float(number), unit, si_unit, difference=difference)
         except ParameterError as error:
-            self.problem(f"{label}: {error}")
+            self.problems.append(f"{label}: {error}")
             return None
         except OverflowError:
             value = math.inf
@@ -412,7 +412,7 @@ class Reader:
             allowed = with_unit(f"{what} from {low:g} to {high:g}", unit)
             meant = angle_meant(label, value, lower, upper) if si_unit == "rad" else ""
             wrong = with_unit(f"{label} = {number:g}", unit)
-            self.problem(f"{wrong} is not allowed: {allowed}{meant}")
+            self.problems.append(f"{wrong} is not allowed: {allowed}{meant}")
             return None
         return value
 
@@ -433,14 +433,16 @@ class Reader:
         if "error" in extra:
             self.of_each_recording(name, label, extra)
             if key.kind == "vector":
-                self.problem(f"{label}.error is not allowed: a list is the same in each recording")
+                self.problems.append(
+                    f"{label}.error is not allowed: a list is the same in each recording"
+                )
         unknown = extra.get("unknown", False)
         if not isinstance(unknown, bool):
             self.refuse(f"{label}.unknown", unknown, "true or false")
             return
         if unknown:
             if "tol" in extra:
-                self.problem(f"{label}: tol and unknown = true exclude each other")
+                self.problems.append(f"{label}: tol and unknown = true exclude each other")
             self.tolerances[name] = math.inf
         elif "tol" in extra:
             tol = self.scalar(
@@ -460,7 +462,7 @@ class Reader:
             )
         for word in ("tol", "unknown", "std"):
             if word in extra:
-                self.problem(f"{label}: {word} and error = {_OWN!r} exclude each other")
+                self.problems.append(f"{label}: {word} and error = {_OWN!r} exclude each other")
         self.own.append(name)
 
     # ------------------------------------------------------------------- effects
@@ -468,7 +470,7 @@ class Reader:
     def effects(self, raw: Any) -> list[dict[str, Any]]:
         """The tables ``[[effects]]``."""
         if not isinstance(raw, list) or not all(isinstance(entry, Mapping) for entry in raw):
-            self.problem(
+            self.problems.append(
                 "effects is not allowed as it is: one table [[effects]] for each is needed"
             )
             return []
@@ -482,7 +484,7 @@ class Reader:
             self.unknown_keys(f"{label}.", entry, ("id", "at", "form", "parameters"))
             identity = entry.get("id")
             if not isinstance(identity, str) or identity not in EFFECTS:
-                self.problem(
+                self.problems.append(
                     f"{label}.id = {_shown(identity)} is not in the "
                     f"catalogue{near_name(str(identity), CATALOGUE)}"
                 )
@@ -493,7 +495,7 @@ class Reader:
                 identity == other["id"] and (not place or other.get("at", "") in ("", place))
                 for other in found
             ):
-                self.problem(
+                self.problems.append(
                     f"{label}.id = {identity!r} is there twice: of several each needs another "
                     "block (at)"
                 )
@@ -539,7 +541,7 @@ class Reader:
             self.no_unit(label, raw, parameter.unit)
             return None
         if "tol" in raw:
-            self.problem(
+            self.problems.append(
                 f"{label}.tol is not allowed: an effect has no nominal value to keep to; how well "
                 "this one is known is its standard deviation, std"
             )
@@ -550,7 +552,7 @@ class Reader:
             self.of_each_recording(f"{qualified(identity, place)}.{parameter.name}", label, raw)
         unit = raw.get("unit")
         if "value" not in raw or not isinstance(unit, str):
-            self.problem(f"{label}: value and unit (like {parameter.unit!r}) are needed")
+            self.problems.append(f"{label}: value and unit (like {parameter.unit!r}) are needed")
             return None
         full = qualified(identity, place)
         value = self.scalar(

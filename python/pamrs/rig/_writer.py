@@ -175,12 +175,13 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
             for name, table in tables_of(model, "supply").items()
         ],
         "valves": [
-            {"name": name, **ports["valve"][name], **_valve(table)}
+            {"name": name, **ports["valve"][name], **_unusual(table, flow="orifice", spool="ideal")}
             for name, table in tables_of(model, "valve").items()
         ],
         "lines": [_line(name, table, ports) for name, table in tables_of(model, "line").items()],
         "chambers": [
-            {"name": name, **_chamber(table)} for name, table in tables_of(model, "chamber").items()
+            {"name": name, **_unusual(table, gas="coefficients")}
+            for name, table in tables_of(model, "chamber").items()
         ],
         "muscles": [
             {
@@ -191,7 +192,16 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
             }
             for name, table in tables_of(model, "muscle").items()
         ],
-        "joints": [_joint(name, table) for name, table in joints.items()],
+        "joints": [
+            {
+                "name": name,
+                "transmission": None if kind_of("joint", table) == "free" else _transmission(table),
+                "rest_angle": table["rest_angle"],
+                **{key: table[key] for key in STOPS},
+                **_nonzero(table, SPRING),
+            }
+            for name, table in joints.items()
+        ],
         "arm": _arm(model, ports),
         "load": model["load"],
         "sensors": [
@@ -229,27 +239,9 @@ def _gauged(table: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if key != "pressure_zero" or value != 0.0}
 
 
-def _chamber(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A chamber; coefficients are what the core takes where no law is given."""
-    usual = table.get("gas") == "coefficients"
-    return {key: value for key, value in table.items() if not (usual and key == "gas")}
-
-
-def _valve(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A valve with an area and an ideal spool is the core's usual one, and needs no word for it."""
-    usual = {"flow": "orifice", "spool": "ideal"}
+def _unusual(table: Mapping[str, Any], **usual: str) -> dict[str, Any]:
+    """A table without the choices that the core takes where none is given."""
     return {key: value for key, value in table.items() if usual.get(key) != value}
-
-
-def _joint(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
-    own = None if kind_of("joint", table) == "free" else _transmission(table)
-    return {
-        "name": name,
-        "transmission": own,
-        "rest_angle": table["rest_angle"],
-        **{key: table[key] for key in STOPS},
-        **_nonzero(table, SPRING),
-    }
 
 
 def _nonzero(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:

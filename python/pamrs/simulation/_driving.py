@@ -206,12 +206,11 @@ class Inputs:
 
 def inputs_of(rig: Rig) -> Inputs:
     """What a rig takes, kept with it: a second run does not look it up again."""
-    cached: Any = rig.__dict__.get("_inputs")
+    cached: Inputs | None = rig.__dict__.get("_inputs")
     if cached is None:
         cached = Inputs(rig)
         object.__setattr__(rig, "_inputs", cached)
-    inputs: Inputs = cached
-    return inputs
+    return cached
 
 
 def initial_names(rig: Rig) -> list[str]:
@@ -333,12 +332,8 @@ def sensor_zero(rig: Rig, kind: str, key: str, block: str) -> float:
     return float(tables.get(block, tables.get("", {})).get(key, 0.0))
 
 
-def _named(
-    channel: str, given: Signals | None, names: list[str], block: str
-) -> dict[str, ArrayLike]:
+def _named(channel: str, given: Signals, names: list[str], block: str) -> dict[str, ArrayLike]:
     """A user's argument as signals by the core's names."""
-    if given is None:
-        return {}
     if not isinstance(given, Mapping):
         if len(names) > 1:
             raise ParameterError(

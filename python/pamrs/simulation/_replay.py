@@ -80,7 +80,7 @@ def replay(
             ):
                 full = dotted(channel, name)
                 first = float(recording.channels[full][recording.mask[full]][0])
-                initial[full] = first - _zero(rig, channel, name)
+                initial[full] = first - sensor_zero(rig, *_STATES[channel], name)
     for name, kelvin in (temperatures or {}).items():
         initial[dotted("temperature", name)] = kelvin
     if not drive:
@@ -111,7 +111,7 @@ def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
         for name in rig.tables("chamber"):
             if _usable(recording, "muscle_pressure", name):
                 measured = _held(recording, dotted("muscle_pressure", name))
-                given[name] = measured - _zero(rig, "muscle_pressure", name)
+                given[name] = measured - sensor_zero(rig, *_STATES["muscle_pressure"], name)
             elif _usable(recording, "pressure_command", name):
                 given[name] = _held(recording, dotted("pressure_command", name))
         if given:
@@ -184,10 +184,4 @@ def _held(recording: Recording, name: str) -> Array:
         raise RecordingError(f"{recording.name}: no usable {name}, which the rig needs")
     rows = recording.mask[name]
     last = np.maximum.accumulate(np.where(rows, np.arange(rows.size), int(np.argmax(rows))))
-    values: Array = recording.channels[name][last]
-    return values
-
-
-def _zero(rig: Rig, channel: str, name: str) -> float:
-    """Zero of the sensor of a block's channel."""
-    return sensor_zero(rig, *_STATES[channel], name)
+    return np.asarray(recording.channels[name][last])

@@ -138,14 +138,23 @@ def simulate_batch(
     reduced = dict(reduce or {})
     kept = -(-rows // whole("every", every, 1))
     wanted = names_of("record", record)
-    _check_size(count, kept, wanted, reduced)
+    if count * (kept * len(wanted) + len(reduced)) > MOST_NUMBERS:
+        raise ParameterError(
+            f"{count} plants with {kept} rows of {len(wanted)} channels are not allowed: at most "
+            f"{MOST_NUMBERS} numbers (2 GB); raise every, or ask for numbers of whole runs "
+            "(reduce)"
+        )
     begin = {name: rowwise(f"initial {name}", (initial or {})[name], count) for name in starts}
     core = core_rig(rig)
     recorded, numbers, ended = _core.side_by_side(
         core,
         count,
         rows,
-        prescribed(_repeated(signals, rows), begin, count),
+        prescribed(
+            {n: np.full(rows, float(v)) if v.ndim == 0 else v for n, v in signals.items()},
+            begin,
+            count,
+        ),
         sample_time,
         chosen_step(sample_time, step),
         _parameters(rig, plants, count),
@@ -201,24 +210,6 @@ def _row_count(signals: Mapping[str, Array], duration: float | None, sample_time
                 "needed"
             )
     return int(rows)
-
-
-def _repeated(signals: Mapping[str, Array], rows: int) -> dict[str, Array]:
-    """Signals over time; a number stays the same in every row."""
-    return {n: np.full(rows, float(v)) if v.ndim == 0 else v for n, v in signals.items()}
-
-
-def _check_size(
-    plants: int, kept: int, record: Sequence[str], reduced: Mapping[str, Reduction]
-) -> None:
-    """Refuse results that would not fit in memory, before anything runs."""
-    numbers = plants * (kept * len(record) + len(reduced))
-    if numbers > MOST_NUMBERS:
-        raise ParameterError(
-            f"{plants} plants with {kept} rows of {len(record)} channels are not allowed: at most "
-            f"{MOST_NUMBERS} numbers (2 GB); raise every, or ask for numbers of whole runs "
-            "(reduce)"
-        )
 
 
 def _reduction(name: str, asked: Reduction, rows: int) -> tuple[str, str, list[float]]:

@@ -458,7 +458,7 @@ def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
     values: nothing is read or wired again. Of any other, muscles that are those of ``like`` are not
     compiled again.
     """
-    cached: Any = rig.__dict__.get("_compiled")
+    cached: _core.Rig | None = rig.__dict__.get("_compiled")
     if cached is None:
         try:
             cached = _revalued(rig, like)
@@ -469,8 +469,7 @@ def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
             known = {name: own.unit for name, own in rig.parameters.items()}
             raise ParameterError(rig.units.retold(str(error), known)) from None
         object.__setattr__(rig, "_compiled", cached)
-    compiled: _core.Rig = cached
-    return compiled
+    return cached
 
 
 def _revalued(rig: Rig, like: _core.Rig | None) -> _core.Rig | None:
@@ -566,7 +565,12 @@ def simulate(
     core = core_rig(rig)
     kept = 1 + len(core.inputs) + len(core.channels if wanted is None else wanted)
     asked = by_signal(valve_command, supply_command, length, pressure)
-    long = [name for name, signal in asked.items() if _is_long(signal)]
+    long = [  # what says how many rows there are
+        name
+        for name, signal in asked.items()
+        for one in (signal.values() if isinstance(signal, Mapping) else [signal])
+        if one is not None and np.ndim(one) > 0
+    ]
     rows = None if duration is None else rows_of(duration, sample_time, long)
     check_rows(kept, rows or 0)
     signals, count = signals_of(rig, asked, rows)
@@ -645,12 +649,6 @@ def loop_samples(
         )
     every = whole_samples("period", sample_time if period is None else period, sample_time, least=1)
     return every, whole_samples("duration", duration, sample_time, least=0)
-
-
-def _is_long(signal: Signals | None) -> bool:
-    """Whether a signal, or one of several, says how many rows there are."""
-    each = signal.values() if isinstance(signal, Mapping) else [signal]
-    return any(np.ndim(one) > 0 for one in each if one is not None)
 
 
 def rows_of(duration: float, sample_time: float, setting: Iterable[str]) -> int:

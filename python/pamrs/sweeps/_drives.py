@@ -16,7 +16,7 @@ import numpy as np
 from pamrs._arrays import Array
 from pamrs._checks import one_of, refused
 from pamrs.channels import dotted, unit_of
-from pamrs.errors import PamrsError, ParameterError, RigError
+from pamrs.errors import ParameterError, RigError
 from pamrs.rig import Rig, parse_rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import REDUCTIONS, core_rig, simulate_batch
@@ -312,9 +312,5 @@ def _run_other(
         core_rig(other, core_rig(rig))
     except (RigError, ParameterError) as error:
         nothing = {name: np.full(n, np.nan) for name in task.drive.metric_units()}
-        return Done(nothing, np.zeros(n), (0, _one_line(error)))
+        return Done(nothing, np.zeros(n), (0, " ".join(str(error).split())))
     return task.drive.run(other, n, rest, task.threads)
-
-
-def _one_line(error: PamrsError) -> str:
-    return " ".join(str(error).split())

@@ -180,7 +180,8 @@ def run_plan(
     if workers is not None and threads is None:
         threads = 1
     plan = Plan.of(rig, axes, drive, chunk)
-    _try_one(plan)
+    first = plan.task(0, 1)  # tried before there is a store, for arguments that are not allowed
+    run_chunk(replace(first, values={name: own[:1] for name, own in first.values.items()}))
     with Store(store, plan, rig) as kept:
         entries = kept.entries.values()
         shown = Progress(
@@ -207,9 +208,3 @@ def _check_names(axes: Axes, drive: Drive) -> None:
     for name in drive.initial if isinstance(drive, OpenLoop) else ():
         if INITIAL + name in axes.names:
             raise ParameterError(f"initial has {name!r}, which varies; leave it out")
-
-
-def _try_one(plan: Plan) -> None:
-    """The first run, so that arguments that are not allowed are found before there is a store."""
-    task = plan.task(0, 1)
-    run_chunk(replace(task, values={name: values[:1] for name, values in task.values.items()}))

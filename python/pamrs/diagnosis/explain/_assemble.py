@@ -140,7 +140,13 @@ def assemble(
         free_traces=found.curves,
         settings=fitted.settings,
     )
-    told = _warnings(case, models, found.table, diagnosis.parameters, same=held is fitted)
+    told = [
+        *words.absolute(case),
+        *words.left_out(case, judged),
+        *(words.reservations(models.chosen) if any(j.named or j.wrong for j in judged) else []),
+        *(words.worse(found.table) if models.added else []),
+        *words.warnings(case, judged, diagnosis.parameters, held is fitted),
+    ]
     diagnosis = replace(diagnosis, warnings=[*constants, *told, *begun])
     picture = _picture(diagnosis.answer.block, found, fitted)
     where = words.where(diagnosis.answer, fitted, judged, picture, found.errors)
@@ -196,25 +202,6 @@ def _forms(models: Models, fitted: Problem) -> dict[str, str]:
             text = "\n".join(map(form_sentence, told))
             found |= dict.fromkeys((b.name for b in group.blocks), text)
     return found
-
-
-def _warnings(
-    case: Case,
-    models: Models,
-    table: dict[str, ChannelError],
-    parameters: dict[str, ParameterFound],
-    *,
-    same: bool,
-) -> list[str]:
-    """What a reader should know before trusting the rest."""
-    named = any(j.named or j.wrong for j in models.judged)
-    return [
-        *words.absolute(case),
-        *words.left_out(case, models.judged),
-        *(words.reservations(models.chosen) if named else []),
-        *(words.worse(table) if models.added else []),
-        *words.warnings(case, models.judged, parameters, same),
-    ]
 
 
 def _tried(groups: list[BlockGroup]) -> list[Tried]:

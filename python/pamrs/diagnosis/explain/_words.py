@@ -125,14 +125,9 @@ def left_out(case: Case, judged: list[Judged]) -> list[str]:
         "is known of it, a value and a tolerance (tol), and diagnose again"
         for effect in named
         for name, known in case.rig.parameters.items()
-        if known.value == known.tol == 0.0 and _unnamed(name) in effect.info.like_values
+        for block, _, key in [split_name(name)]
+        if known.value == known.tol == 0.0 and f"{block}.{key}" in effect.info.like_values
     ]
-
-
-def _unnamed(name: str) -> str:
-    """A parameter without the name of its block: ``link.viscous`` of ``link.hand.viscous``."""
-    block, _, key = split_name(name)
-    return f"{block}.{key}"
 
 
 def warnings(

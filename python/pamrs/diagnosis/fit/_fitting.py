@@ -310,9 +310,10 @@ def _steps(rig: Rig, cores: Mapping[str, _core.Rig], names: Sequence[str]) -> di
     """By how much each parameter is shifted to whose value the core has no sensitivities."""
     told, known = {n for core in cores.values() for n in core.parameter_names}, rig.parameters
     return {
-        name: _shift(known[name]) * (-1.0 if _at_end(known[name]) else 1.0)
+        name: shift if known[name].value + shift <= known[name].upper else -shift
         for name in names
         if name in known and name not in told
+        for shift in [_shift(known[name])]
     }
 
 
@@ -321,11 +322,6 @@ def _shift(known: Parameter) -> float:
     if math.isfinite(known.tol):
         return _SHIFT_TOLERANCES * known.tol
     return _UNKNOWN_SHARE * abs(known.value) if known.value else _UNKNOWN_SHARE
-
-
-def _at_end(known: Parameter) -> bool:
-    """Whether a parameter cannot be shifted upwards."""
-    return known.value + _shift(known) > known.upper
 
 
 def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:

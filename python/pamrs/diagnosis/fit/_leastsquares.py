@@ -96,7 +96,9 @@ def levenberg_marquardt(
         hard = damping
         step = _step(x, gradient, normal, hard, low, high)
         # a long step that the walls bend may lead uphill: a shorter one meets fewer of them
-        while (gain := _promise(step, gradient, normal)) < worth and hard < _MOST_DAMPING:
+        while (
+            gain := -2.0 * float(gradient @ step) - float(step @ normal @ step)
+        ) < worth and hard < _MOST_DAMPING:
             hard = 10.0 * hard
             step = _step(x, gradient, normal, hard, low, high)
         late = reached[-1 - _STALL_EVALUATIONS :]
@@ -125,11 +127,6 @@ def levenberg_marquardt(
             if damping > _MOST_DAMPING:
                 break
     return x, best, spent
-
-
-def _promise(step: Array, gradient: Array, normal: Array) -> float:
-    """Predicted gain of a step in the sum of squares."""
-    return -2.0 * float(gradient @ step) - float(step @ normal @ step)
 
 
 def _step(

@@ -73,7 +73,11 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
     """
     first = problems[0]
     recordings = list({p.recording.name: p for q in problems for p in q.recordings}.values())
-    blocks = [b for b in first.blocks if not b.mechanical and _commanded(b)]
+    blocks = [
+        b
+        for b in first.blocks
+        if not b.mechanical and any(channel_of(name).endswith("_command") for name in b.drives)
+    ]
     if not blocks:
         return list(problems), []
     whole = replace(first, blocks=blocks, recordings=recordings)
@@ -133,11 +137,6 @@ def _missed(problem: Problem, rig: Rig) -> list[tuple[float, int]]:
         missed = [r.value[r.rows] / r.noise for r in own]
         sums.append((sum(float(v @ v) for v in missed), sum(v.size for v in missed)))
     return sums
-
-
-def _commanded(block: Block) -> bool:
-    """Whether a command drives a block."""
-    return any(channel_of(name).endswith("_command") for name in block.drives)
 
 
 def _changes(prepared: Prepared) -> Rows:

@@ -79,8 +79,7 @@ def _pull(root: Array, jacobian: Array, rows: Array) -> Array:
     """
     share, axes = np.linalg.eigh(root @ (jacobian.T @ jacobian) @ root)
     leverage = np.sqrt(np.maximum(1.0 - share, np.finfo(float).eps ** 0.5))
-    pull: Array = root @ (axes / leverage @ (axes.T @ (root @ (jacobian.T @ rows))))
-    return pull
+    return np.asarray(root @ (axes / leverage @ (axes.T @ (root @ (jacobian.T @ rows)))))
 
 
 def pieces_of(problem: Problem, found: dict[Key, Residual]) -> list[Index]:

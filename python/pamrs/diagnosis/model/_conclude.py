@@ -516,16 +516,11 @@ def _added(nominal: Rig, candidates: list[Candidate]) -> Iterator[tuple[Candidat
     """Effects that the fits have and the nominal model has not, each from the fit that knows it
     best.
     """
-    owners = owners_of_effects(candidates)
+    owners, stated = owners_of_effects(candidates), {entry["id"] for entry in nominal.effects}
     for k, candidate in enumerate(candidates):
         for entry in candidate.fit.rig.effects:
-            if entry["id"] not in _ids(nominal) and owners.get(Term.of(entry), k) == k:
+            if entry["id"] not in stated and owners.get(Term.of(entry), k) == k:
                 yield candidate, entry
-
-
-def _ids(rig: Rig) -> set[str]:
-    """Ids of the effects that a rig holds."""
-    return {entry["id"] for entry in rig.effects}
 
 
 def with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[str, int]) -> Rig:

@@ -111,7 +111,7 @@ def free_run(
     for prepared in (_with_starts(p, problem, found["after"]) for p in problem.recordings):
         recording = prepared.recording
         try:
-            there = _with(final, events, recording)
+            there = final if events is None else events.put_into(final, recording.name)
             run, drawn = _of(prepared, problem, found, nominal, there, noise_level or {})
             runs.append(_judged(run, prepared, problem.blocks, there, known))
             missed = max((e.times_before for e in run.channels.values()), default=0.0)
@@ -128,11 +128,6 @@ def _with_starts(prepared: Prepared, problem: Problem, found: dict[Key, Residual
     """A recording with the temperatures at which its gases began, as their blocks have them."""
     own = {b.channel: found[b.name, prepared.recording.name].temperature for b in problem.blocks}
     return replace(prepared, temperatures={n: kelvin for n, kelvin in own.items() if kelvin})
-
-
-def _with(rig: Rig, events: Events | None, recording: Recording) -> Rig:
-    """A model with what happened in one recording."""
-    return rig if events is None else events.put_into(rig, recording.name)
 
 
 def _of(
@@ -204,7 +199,8 @@ def _judged(
     ]
     if known is None or not doubtful:
         return run
-    if _is_ahead(final, run.seconds):
+    clocks = [effect["parameters"] for effect in final.effects if "clock" in ports_of(effect)]
+    if any(min(p["offset"], p["offset"] + p["rate"] * run.seconds) < 0.0 for p in clocks):
         note = "a clock ahead of its commands cannot be simulated: what is missed says nothing"
         return replace(run, note=f"{run.note}; {note}" if run.note else note)
     logged, note = _as_logged(prepared.recording), run.note
@@ -225,12 +221,6 @@ def _judged(
             off.discard(name)
     channels = {n: replace(e, off=n in off) for n, e in run.channels.items()}
     return replace(run, channels=channels, note=note)
-
-
-def _is_ahead(rig: Rig, seconds: float) -> bool:
-    """Whether a rig has a clock that is ahead of its commands in a recording of some length."""
-    clocks = [effect["parameters"] for effect in rig.effects if "clock" in ports_of(effect)]
-    return any(min(p["offset"], p["offset"] + p["rate"] * seconds) < 0.0 for p in clocks)
 
 
 def _left(

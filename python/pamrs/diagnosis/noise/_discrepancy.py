@@ -114,7 +114,11 @@ def curves(
         What each wave, one standard deviation high, does to the bin means, in the channel's unit;
         None where no error acts here.
     """
-    waves = _waves(_CURVE_WAVES)
+    # wave number [rad per range] and standard deviation of each wave of a curve of the size 1; the
+    # mean square of a wave is half of its height's, that of a shift is all of it
+    waves = [
+        (math.pi * k, math.sqrt((2.0 if k else 1.0) / _CURVE_WAVES)) for k in range(_CURVE_WAVES)
+    ]
 
     def over(name: str) -> list[Array]:
         low, wide = ranges[name]
@@ -139,12 +143,6 @@ def curves(
             for curve in over(place)
         ]
     return np.column_stack(columns) if columns else None
-
-
-def _waves(count: int) -> list[tuple[float, float]]:
-    """Wave number [rad per range] and standard deviation of each wave of a curve of the size 1."""
-    # the mean square of a wave is half of its height's, that of a shift is all of it
-    return [(math.pi * k, math.sqrt((2.0 if k else 1.0) / count)) for k in range(count)]
 
 
 def _signal(prepared: Prepared, name: str) -> Array | None:

@@ -1020,12 +1020,6 @@ def _beside_starts(columns: list[Array], starts: list[tuple[int, int, Array]]) -
     return np.asarray(basis[:, np.abs(np.diag(triangle)) > rounding])
 
 
-def _own(core: _core.Rig, prepared: Prepared) -> list[str]:
-    """Parameters whose value a recording has of its own and nobody knows."""
-    given = prepared.recording.parameters.items()
-    return [n for n, own in given if own.error == "own" and n in core.parameter_names]
-
-
 def _with_slopes(
     block: Block,
     core: _core.Rig,
@@ -1118,7 +1112,8 @@ def residual(
     starts = prepared.starts(block.window, block.drives)
     # without parameters a free null direction is still wanted for the window's start: ask for one
     # parameter
-    own = _own(core, prepared)
+    given_own = [n for n, v in prepared.recording.parameters.items() if v.error == "own"]
+    own = [n for n in given_own if n in core.parameter_names]
     names = list(dict.fromkeys([*parameters, *own])) or [
         next(
             (n for n in core.parameter_names if n.endswith("pressure_zero")),

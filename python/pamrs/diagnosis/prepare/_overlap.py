@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pamrs._arrays import Mask
+from pamrs._arrays import Mask, stretches
 from pamrs.diagnosis.prepare._deviations import (
     LEAST_SAMPLES,
     WINDOW_SAMPLES,
@@ -177,7 +177,7 @@ def overlap(
     found = max(each, key=lambda one: int(one.same.sum()), default=None)
     if found is None:
         return None
-    runs = [(float(slow.time[a]), float(slow.time[b - 1])) for a, b in _runs(_taken(found))]
+    runs = [(float(slow.time[a]), float(slow.time[b - 1])) for a, b in stretches(_taken(found))]
     rows = np.flatnonzero(found.same)
     at = (float(slow.time[rows[0]]), float(slow.time[rows[-1]]))
     there = _in_other(found.way, at)
@@ -207,21 +207,15 @@ def _taken(found: Told) -> Mask:
     over three windows or more.
     """
     shared, own = found.same.copy(), np.zeros(found.same.size, dtype=bool)
-    for first, last in _runs(found.other):
+    for first, last in stretches(found.other):
         own[first:last] = last - first >= LEAST_SAMPLES
-    for first, last in _runs(~own & ~shared & found.inside):
+    for first, last in stretches(~own & ~shared & found.inside):
         beside = own[[k for k in (first - 1, last) if 0 <= k < own.size]]
         # what cannot be told is new where noise of its own is on both sides; so is part of a window
         part = last - first < WINDOW_SAMPLES
         new = beside.any() if part else beside.size == 2 and beside.all()
         shared[first:last] = not new
     return shared
-
-
-def _runs(of: Mask) -> list[tuple[int, int]]:
-    """First and one past the last row of each run."""
-    edges = np.flatnonzero(np.diff(np.r_[False, of, False].astype(int))).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def _gaps(

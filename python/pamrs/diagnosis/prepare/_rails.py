@@ -145,7 +145,14 @@ def without_poor_thermometers(
         ]
         if faults:
             said.append(f"{name} is not judged: {'; '.join(faults)}")
-            recordings = [_without(r, name) for r in recordings]
+            recordings = [
+                replace(
+                    r,
+                    channels={n: v for n, v in r.channels.items() if n != name},
+                    mask={n: v for n, v in r.mask.items() if n != name},
+                )
+                for r in recordings
+            ]
     return list(recordings), said
 
 
@@ -162,12 +169,3 @@ def _fault(recording: Recording, name: str) -> str:
             "it as fast as the pressures, or the pressures as slowly"
         )
     return ""
-
-
-def _without(recording: Recording, name: str) -> Recording:
-    """A recording without a channel."""
-    return replace(
-        recording,
-        channels={n: v for n, v in recording.channels.items() if n != name},
-        mask={n: v for n, v in recording.mask.items() if n != name},
-    )

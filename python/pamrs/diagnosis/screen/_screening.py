@@ -319,7 +319,7 @@ class _Looking:
                 score is None
                 or score.gain <= 0.0
                 or not start.scalable
-                or self._about_this_size(score)
+                or _REPEAT_BELOW <= abs(score.size) < _MOST_LINEAR
             ):
                 break
             # what a stop or a threshold does is not in proportion to its size: it is looked at
@@ -338,7 +338,7 @@ class _Looking:
         self.signatures.append(best[0])
         if not start.effect.at:
             self.everywhere[_values(start)] = best[0][1]
-        return _gain(best)
+        return -math.inf if best[1] is None else best[1].gain
 
     def _look(self, start: Start) -> tuple[Signature, Score | None] | None:
         """The signature of a start and its score; None where the model cannot be run so."""
@@ -376,10 +376,6 @@ class _Looking:
         own = {b.name for b in self.problem.blocks if not any(acts_in(t, b) for t in rivals)}
         return {key: r for key, r in seen.items() if key[0] in own}
 
-    def _about_this_size(self, score: Score) -> bool:
-        """Whether a signature says that its effect has about the size at which it was taken."""
-        return _REPEAT_BELOW <= abs(score.size) < _MOST_LINEAR
-
     def _taken(self, entry: Signature) -> float:
         """What a start takes of the chi-square at its own size."""
         signature = entry[2]
@@ -392,11 +388,6 @@ def _values(start: Start) -> _Values:
     values = start.free | start.held
     own = tuple(sorted((n.removeprefix(str(start.effect)), v) for n, v in values.items()))
     return start.effect.id, start.form, own
-
-
-def _gain(seen: tuple[Signature, Score | None]) -> float:
-    """What a start would bring by its signature."""
-    return -math.inf if seen[1] is None else seen[1].gain
 
 
 def _measured(problem: Problem, channel: str) -> Array | None:

@@ -579,9 +579,15 @@ class Mismatch:
         refit, weighed = self.refit, self.weighed
         now = refit.start.fitted[self.block.name]
         part = refit.trial.inner.losses.part
+        screened = self.search.screened
+        # of the chi-square that is left noise has its part
+        share = 1.0 - 1.0 / max(now.ratio, 1.0 + _MARGINAL_EXCESS)
+        missing = screened.tangent.power_left * share
         group = replace(
             refit.group(self.candidates, weighed, self.block),
-            predicted_gain=_predicted_gain(self.search.screened, now, _MARGINAL_EXCESS),
+            predicted_gain={
+                e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()
+            },
         )
         if _leading(weighed) == UNLISTED:
             what = "the division of the blocks by their names"
@@ -735,13 +741,6 @@ def _weigh_to_the_end(
         candidates = [c for c in ended if c.is_wrong(settings.most_tolerances)]
         found = weights(candidates)
     return candidates, found
-
-
-def _predicted_gain(screened: Screen, kept: Excess, least: float) -> dict[Term, float]:
-    """Share of the mismatch that each effect could take by its signature alone."""
-    # of the chi-square that is left noise has its part
-    missing = screened.tangent.power_left * (1.0 - 1.0 / max(kept.ratio, 1.0 + least))
-    return {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
 
 
 def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGroup:

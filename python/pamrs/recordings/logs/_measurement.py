@@ -44,6 +44,7 @@ def read_mdf(path: Path, form: TextFormat) -> Log:
         for number, group in enumerate(file.groups):
             master = file.masters_db.get(number)
             time: Array | None = None
+            called = getattr(group.channel_group, "acq_name", "") or f"group {number + 1}"
             for index, channel in enumerate(group.channels):
                 if index == master:
                     continue
@@ -61,7 +62,7 @@ def read_mdf(path: Path, form: TextFormat) -> Log:
                 if master is not None and time is None:
                     time = np.asarray(signal.timestamps, dtype=np.float64)
                 several = len(file.channels_db.get(channel.name, ())) > 1
-                prefix = f"{_group_name(group, number)}/" if several else ""
+                prefix = f"{called}/" if several else ""
                 found.append(Series(prefix + channel.name, values, signal.unit or "", time))
     return collected(path, found, unread)
 
@@ -84,11 +85,6 @@ def _opened(path: Path) -> Any:
                 gc.collect()
             sys.unraisablehook = hook
     raise ValueError(reason)  # the reader of every format says of which file
-
-
-def _group_name(group: Any, number: int) -> str:
-    name = getattr(group.channel_group, "acq_name", "")
-    return name or f"group {number + 1}"
 
 
 def read_tdms(path: Path, form: TextFormat) -> Log:

@@ -323,15 +323,12 @@ def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:
         labels = ()
     for part, inside in fields.items():
         inner = f"{name}/{part}"
-        if part != "name" and _length(inside) == len(labels) > 0:
+        listed = isinstance(inside, (list, tuple, np.ndarray)) and part != "name"
+        if listed and len(inside) == len(labels) > 0:
             for label, item in zip(labels, inside, strict=True):
                 yield from _numbers(f"{inner}[{label}]", item, depth + 1)
         else:
             yield from _numbers(inner, inside, depth + 1)
-
-
-def _length(value: Any) -> int:
-    return len(value) if isinstance(value, (list, tuple, np.ndarray)) else -1
 
 
 def _slots(message: Any) -> dict[str, Any]:
