@@ -38,6 +38,8 @@ from pamrs.rig import Parameter, Rig
 
 # weightings of pieces for a share's interval: ten of them lie beyond each 95 % end
 _BUDGET_DRAWS = 400
+# [tolerances] standard deviation below which a parameter counts as determined by the recordings
+_DETERMINED_SHARE = 0.7
 
 
 _NAMED = ("wrong_parameter", "effect")
@@ -369,7 +371,8 @@ class _Shares:
 
 def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
     """The group that tells most of each parameter that several have (sensors' zeros): the one with
-    the least standard deviation.
+    the least standard deviation; of those that tell hardly more than the file, the last one along
+    the chain, whose output it is.
 
     What a group leaves without a name is in its autocorrelation, and so in its standard deviations.
     Events are fitted with the values beside them, which stay.
@@ -377,7 +380,8 @@ def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
 
     def spread(k: int, name: str) -> float:
         own = candidates[k].fit
-        return own.std.get(name, math.inf) if own.events is None else 0.0
+        std = own.std.get(name, math.inf) if own.events is None else 0.0
+        return min(std, _DETERMINED_SHARE * own.scales[name]) if name in own.scales else std
 
     found: dict[str, int] = {}
     for k, candidate in enumerate(candidates):
