@@ -23,7 +23,7 @@ PACKAGES = {
     "cli": 1363,
     "control": 4594,
     "design": 530,
-    "diagnosis": 11000,
+    "diagnosis": 11002,
     "effects": 404,
     "experiments": 1052,
     "findings": 946,
@@ -47,7 +47,7 @@ ASIDE = {
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35837
+MOST = 35839
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 
