@@ -30,7 +30,7 @@ PACKAGES = {
     "fit": 2937,
     "library": 71,
     "recordings": 4863,
-    "report": 2057,
+    "report": 2059,
     "rig": 2222,
     "rigs": 139,
     "simulation": 1076,
@@ -47,7 +47,7 @@ ASIDE = {
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35839
+MOST = 35841
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -382,8 +382,10 @@ class _Drawing:
         title = low - 8.0 if under else y + 17.0
         lit = name == (self.diagnosis.answer.block or self.diagnosis.where.block)
         left = left_in(self.diagnosis, name, "refit")
-        size = "fits to the noise" if left == "noise" else ""
         missed = mismatch and miss(self.diagnosis, mismatch.channel, "refit")
+        if missed and format_number(missed.noises, 2) == "1.0":
+            left = "noise"
+        size = "fits to the noise" if left == "noise" else ""
         if left in ("error", "more") and missed:
             usual = "usual error: " if left == "error" else "misses "
             size = f"{usual}{format_number(missed.noises, 2)} × noise"
