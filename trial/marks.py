@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -322,6 +323,13 @@ def _nearest(reached: float) -> str:
     return f"{min(STRENGTHS, key=lambda s: abs(math.log(max(reached, 1e-9) / s))):g}"
 
 
+def _stratum(size: float, edges: Sequence[float]) -> str:
+    """Between which edges a size is: ``1.5 to 3``."""
+    between = [f"{low:g} to {high:g}" for low, high in itertools.pairwise(edges)]
+    words = (f"below {edges[0]:g}", *between, f"above {edges[-1]:g}")
+    return words[sum(size >= edge for edge in edges)]
+
+
 def _own(key: dict[str, Any]) -> tuple[str, ...]:
     """How much the weakest effect leaves in the channel of its own block [noises]."""
     sizes = [
@@ -333,9 +341,7 @@ def _own(key: dict[str, Any]) -> tuple[str, ...]:
     ]
     if not sizes:
         return ()
-    edges = (1.5, 3.0, 10.0, 100.0)
-    words = ("below 1.5", "1.5 to 3", "3 to 10", "10 to 100", "above 100")
-    return (words[sum(min(sizes) >= e for e in edges)],)
+    return (_stratum(min(sizes), (1.5, 3.0, 10.0, 100.0)),)
 
 
 def _distance(key: dict[str, Any], result: dict[str, Any] | None) -> float | None:
@@ -351,17 +357,10 @@ def _distance(key: dict[str, Any], result: dict[str, Any] | None) -> float | Non
     return max(found, default=None)
 
 
-def _decade(distance: float | None) -> tuple[str, ...]:
-    """Stratum of a distance; none without one."""
-    if distance is None:
-        return ()
-    words = ("below 1", "1 to 2", "2 to 4", "4 to 8", "8 to 16", "above 16")
-    return (words[sum(distance >= edge for edge in (1.0, 2.0, 4.0, 8.0, 16.0))],)
-
-
 def _tags(key: dict[str, Any], result: dict[str, Any] | None) -> dict[str, tuple[str, ...]]:
     """The strata of a case."""
     spec, effects = key["spec"], key["effects"]
+    distance = _distance(key, result)
     lab, percent = spec["lab"], int(spec["percent"])
     marks = {e["mark"] for e in effects}
     kind = "effect" if effects else "healthy"
@@ -374,7 +373,7 @@ def _tags(key: dict[str, Any], result: dict[str, Any] | None) -> dict[str, tuple
         "strength": (_nearest(max(e["reached"] for e in effects)),) if effects else (),
         "effects": (str(len(effects)),) if effects else (),
         "own channel": _own(key),
-        "distance": _decade(_distance(key, result)),
+        "distance": () if distance is None else (_stratum(distance, (1.0, 2.0, 4.0, 8.0, 16.0)),),
         "placing": (("one block" if len(blocks) == 1 else "several blocks"),)
         if len(effects) > 1
         else (),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -12,19 +10,12 @@ import pytest
 
 import pamrs
 from pamrs.findings import WrongParameter
-
-HOME = Path(__file__).parents[2] / "cases" / "layouts"
+from tests.loaded import CASES, load_module
 
 
 @pytest.fixture(scope="module")
 def layouts() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("layouts", HOME / "layouts.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["layouts"] = module
-    spec.loader.exec_module(module)
-    return module
+    return load_module(CASES / "layouts" / "layouts.py")
 
 
 def test_every_layout_writes_a_case_that_is_read(layouts: ModuleType, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from pathlib import Path
 
@@ -11,18 +10,13 @@ import numpy as np
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import available_blocks
+from tests.loaded import CASES, load_module
 
 SETTINGS = DiagnosisSettings()
 
-FOLDER = Path(__file__).parents[2] / "cases" / "pam_arm_shaj"
-
 
 def test_episodes_become_a_case(tmp_path: Path) -> None:
-    spec = importlib.util.spec_from_file_location("convert", FOLDER / "convert.py")
-    assert spec is not None
-    assert spec.loader is not None
-    convert = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(convert)
+    convert = load_module(CASES / "pam_arm_shaj" / "convert.py")
     data = tmp_path / "data"
     data.mkdir()
     rng = np.random.default_rng(1)

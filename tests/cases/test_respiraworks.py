@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -13,8 +11,8 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis.prepare import available_blocks
+from tests.loaded import CASES, load_module
 
-FOLDER = Path(__file__).parents[2] / "cases" / "respiraworks"
 HEAD = "# covent_pc_4\n# Built at revision a9175b3 (dirty)\n"
 TIME = np.arange(0.0, 12.0, 0.01)
 BREATH = (TIME + 2.5) % 3.0 < 1.0
@@ -23,13 +21,7 @@ BREATH = (TIME + 2.5) % 3.0 < 1.0
 
 @pytest.fixture(scope="module")
 def convert() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("respiraworks", FOLDER / "convert.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["respiraworks"] = module
-    spec.loader.exec_module(module)
-    return module
+    return load_module(CASES / "respiraworks" / "convert.py")
 
 
 def log(**series: np.ndarray) -> str:

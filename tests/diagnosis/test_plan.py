@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment._differences import _UNSTATED_STD_SHARE, _free
 from pamrs.effects import CATALOGUE, EFFECTS
+from pamrs.errors import SimulationError
 from pamrs.experiments import commands_for, library, pressure_range
 from pamrs.findings import DETECTED, TOLD_APART
 from pamrs.simulation import core_rig
@@ -78,6 +80,25 @@ def test_a_plan_tells_how_far_it_is() -> None:
     assert [line.share for line in heard] == [0.0, 0.25, 0.5, 0.75]  # type: ignore[attr-defined]
 
 
+def test_an_experiment_that_the_model_cannot_follow_is_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = pamrs.rigs.sealed_chamber()
+    low, *_ = library(rig, SETTINGS, only=["hold_low"])
+
+    def lost(*_: Any) -> None:
+        raise SimulationError("the pressure leaves its range")
+
+    high = replace(low, name="hold_high")
+    monkeypatch.setattr(plan, "library", lambda *_: [low, high])
+    simulate = type(low).simulate
+    monkeypatch.setattr(
+        type(low), "simulate", lambda own, of: (lost if own is high else simulate)(own, of)
+    )
+    found = pamrs.plan_diagnosis(rig, ["muscle_pressure"], progress=lambda _: None)
+    assert [each["name"] for each in found.experiments] == ["hold_low"]
+
+
 def test_unknown_names_are_errors_that_name_them() -> None:
     rig = pamrs.rigs.sealed_chamber()
     for channel, more, words in (
@@ -111,10 +132,10 @@ def few():
     made = plan._products
     kept: dict[tuple[Any, ...], Any] = {}
 
-    def once(blocks, rig, name, *rest):
-        own = (*blocks, name)
+    def once(blocks, rig, prepared, *rest):
+        own = (*blocks, prepared.recording.name)
         if own not in kept:
-            kept[own] = made(blocks, rig, name, *rest)
+            kept[own] = made(blocks, rig, prepared, *rest)
         return kept[own]
 
     with pytest.MonkeyPatch.context() as patch:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import re
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 import typer
@@ -16,25 +14,17 @@ from pamrs.channels import CHANNELS
 from pamrs.cli import app
 from pamrs.rig.schema import BLOCKS, PORTS
 from pamrs.units import DIMENSIONS
+from tests.loaded import load_module
 
-FILE = Path(__file__).parents[2] / "docs/_site/made_reference.py"
-
-
-def loaded() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("made_reference", FILE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+PAGES = load_module(Path(__file__).parents[2] / "docs/_site/made_reference.py")
 
 
-MADE = {name: "\n".join(make()) for name, make in loaded().MADE.items()}
+MADE = {name: "\n".join(make()) for name, make in PAGES.MADE.items()}
 
 
 def test_the_tables_in_the_sources_are_the_made_ones() -> None:
     """`make reference` writes them."""
-    pages = dict(loaded().made_pages())
+    pages = dict(PAGES.made_pages())
     assert [page for page, text in pages.items() if page.read_text(encoding="utf-8") != text] == []
     marked = "".join(pages.values())
     assert all(f"<!-- {name} -->" in marked for name in MADE)

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.integrate import trapezoid
 
 from pamrs._arrays import Array, ArrayLike
 from pamrs._checks import as_numbers, refused
@@ -99,7 +98,7 @@ def squared_error(
         and its result is NaN), or the unit is unknown.
     """
     t, e = _error(time, reference, angle)
-    return _plain(_factor(unit) ** 2 * trapezoid(e * e, t))
+    return _plain(_factor(unit) ** 2 * _integral(t, e * e))
 
 
 def total_curvature(
@@ -226,7 +225,7 @@ def rms(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Arra
         As :func:`squared_error`.
     """
     t, e = _error(time, reference, angle)
-    return _plain(np.sqrt(trapezoid(e * e, t) / (t[-1] - t[0])))
+    return _plain(np.sqrt(_integral(t, e * e) / (t[-1] - t[0])))
 
 
 def lag(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Array:
@@ -291,9 +290,9 @@ def phases(
         part, when = e[..., inside], t[inside]
         length = when[-1] - when[0]
         found[name] = {
-            "rms": _plain(np.sqrt(trapezoid(part * part, when) / length)),
+            "rms": _plain(np.sqrt(_integral(when, part * part) / length)),
             "largest": _plain(np.abs(part).max(axis=-1)),
-            "mean": _plain(trapezoid(part, when) / length),
+            "mean": _plain(_integral(when, part) / length),
             "final": _plain(part[..., -1]),
         }
     return found
@@ -405,3 +404,12 @@ def _plain(values: ArrayLike) -> float | Array:
     """A float for one run."""
     found = np.asarray(values, dtype=np.float64)
     return float(found) if found.ndim == 0 else found
+
+
+def _integral(time: Array, values: Array) -> Array:
+    """Integral over time along the last axis by the trapezoidal rule (numpy 1 and 2 name theirs
+    differently).
+    """
+    return np.asarray(
+        (0.5 * (values[..., 1:] + values[..., :-1]) * np.diff(time)).sum(axis=-1), dtype=np.float64
+    )

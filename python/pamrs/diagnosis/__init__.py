@@ -420,16 +420,18 @@ def _missing(
 
 def _limits(found: Conclusion, inner: Problem, outer: Problem) -> list[Limit]:
     """From which sizes on the recordings would have shown effects and told them apart."""
-    every = replace(inner, recordings=[p for part in _by_role(inner, outer).values() for p in part])
-    baseline, errors = found.models.baseline, found.own_errors
+    every, baseline = _together(inner, outer), found.models.baseline
     left = {
-        b.name: beyond(
-            found.table[b.channel].after, found.table[b.channel].noise, errors[b.channel]
-        )
+        b.name: beyond(error.after, error.noise, found.own_errors[b.channel])
         for b in inner.blocks
-        if b.channel in found.table
+        if (error := found.table.get(b.channel))
     }
     return limits_of(every, baseline, list(free_baseline(every, baseline)), found.noise_level, left)
+
+
+def _together(inner: Problem, outer: Problem) -> Problem:
+    """All recordings, of every role."""
+    return replace(inner, recordings=[p for part in _by_role(inner, outer).values() for p in part])
 
 
 def _by_role(inner: Problem, outer: Problem) -> dict[str, list[Prepared]]:
@@ -500,7 +502,7 @@ def missing_input(
         inner, outer, _, _ = _problems(replace(ready.case, recordings=shortened), chosen, ())
         inner, outer, _ = _on_time(inner, outer, ready.case.rig)
         roles = _by_role(inner, outer)
-        every = replace(inner, recordings=[p for part in roles.values() for p in part])
+        every = _together(inner, outer)
         if block is not None:
             there = {b.name: b for b in inner.blocks}
             if block not in there:

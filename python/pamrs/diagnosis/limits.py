@@ -12,13 +12,15 @@ models, Automatica 49, 2013: distinguishability; the error of the model counts a
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
-from pamrs._arrays import Array, solve_normal
+from pamrs._arrays import Array, Mask, solve_normal
 from pamrs.diagnosis.fit import (
     Key,
     Problem,
@@ -123,17 +125,6 @@ def products_of(
     base = residuals(problem, rig, list(baseline))
     known = known_parameters(rig)
     tolerances = np.array([known[name].tol for name in baseline])
-    wide = {
-        b.name: max(
-            (
-                own.curves.shape[1]
-                for k, own in noise_level.items()
-                if k[0] == b.name and own.curves is not None
-            ),
-            default=0,
-        )
-        for b in problem.blocks
-    }
     columns: dict[tuple[Block, str], list[Array]] = {}
     weights: dict[tuple[Block, str], float] = {}
     for prepared in problem.recordings:
@@ -141,16 +132,12 @@ def products_of(
             place = block, prepared.recording.name
             found = base[block.name, prepared.recording.name]
             level = noise_level[block.name, prepared.recording.name]
-            slopes = np.zeros((found.value.size, 0))
-            slopes = slopes if found.jacobian is None else found.jacobian * tolerances
-            means, counts = binned(slopes, found.rows, bins_of(prepared))
-            seen = np.flatnonzero(counts)
-            curves = np.zeros((means.shape[0], wide[block.name]))
-            if level.curves is not None:
-                curves[:, : level.curves.shape[1]] = level.curves
-            independent = counted(prepared, block, problem.settings) / max(1, seen.size)
+            free = np.zeros((found.value.size, 0)) if found.jacobian is None else found.jacobian
+            means, counts = binned(free * tolerances, found.rows, bins_of(prepared))
+            curves = np.empty((means.shape[0], 0)) if level.curves is None else level.curves
             noise = level.noise * max(1.0, (left or {}).get(block.name, 1.0))
-            weights[place] = math.sqrt(independent) / noise if noise > 0.0 else 0.0
+            share = counted(prepared, block, problem.settings) / max(1, int((counts > 0).sum()))
+            weights[place] = math.sqrt(share) / noise if noise > 0.0 else 0.0
             columns[place] = [curves, means, np.zeros((means.shape[0], len(starts)))]
     for k, start in enumerate(starts):
         acting = replace(problem, blocks=[b for b in problem.blocks if acts_in(start.effect, b)])
@@ -161,14 +148,11 @@ def products_of(
         for prepared in problem.recordings:
             for block in acting.blocks:
                 key = block.name, prepared.recording.name
-                change = found_with[key].value - base[key].value
-                means, _ = binned(change, base[key].rows, bins_of(prepared))
+                moved = found_with[key].value - base[key].value
+                means, _ = binned(moved, base[key].rows, bins_of(prepared))
                 columns[block, prepared.recording.name][2][:, k] = means
-    out = {}
-    for place, parts in columns.items():
-        every = weights[place] * np.hstack(parts)
-        out[place] = every.T @ every
-    return out
+    every = {place: weights[place] * np.hstack(parts) for place, parts in columns.items()}
+    return {place: own.T @ own for place, own in every.items()}
 
 
 def _freed(products: Array, count: int) -> Array:
@@ -219,9 +203,9 @@ class Limits:
     ----------
     each : dict of str to Limit
         By effect.
-    together : (k, k) array
-        Products of the effects' signatures, of the start of each that shows most, with all that
-        is free taken off.
+    bits : float
+        Half the logarithm of the determinant of the effects' information at their typical sizes
+        [bit].
     """
 
     def __init__(
@@ -234,8 +218,7 @@ class Limits:
         names = [str(s.effect) for s in starts]
         k, count = len(baseline), len(starts)
         self.each = {name: Limit(name) for name in names}
-        self.together = np.zeros((0, 0))
-        self._apart: dict[tuple[str, str], float] = {}
+        self.bits = 0.0
         if not products:
             return
         of_block: dict[Block, Array] = {}
@@ -253,54 +236,80 @@ class Limits:
         total = np.asarray(sum(rest))
         # a parameter beyond its tolerances is a rival, too: its own column without a prior
         free = total - total[:, :k] @ solve_normal(total[:k, :k] + np.eye(k), total[:k])
-        self._labels = [*baseline, *names]
+        self._labels = np.array([*baseline, *names])
         self._free, self._power = free, np.clip(np.diag(free), 0.0, None)
-        best = {names[j]: j for j in np.argsort(self._power[k:]).tolist()}
-        for name, j in best.items():
+        self._best = {names[j]: k + j for j in np.argsort(self._power[k:]).tolist()}
+        for name, at in self._best.items():
+            j = at - k
             where = max(own, key=lambda place: float(own[place][j]))
             self.each[name] = self._limit(
-                starts[j], k + j, float(own[where][j]), (where[0].name, where[1])
+                starts[j], float(own[where][j]), (where[0].name, where[1])
             )
-        chosen = [k + best[name] for name in self.each]
-        self.together = free[np.ix_(chosen, chosen)]
+        chosen = [self._best[name] for name in self.each]
+        information = np.eye(len(chosen)) + free[np.ix_(chosen, chosen)]
+        self.bits = 0.5 * float(np.linalg.slogdet(information)[1]) / math.log(2.0)
 
-    def _limit(self, start: Start, at: int, left: float, where: tuple[str, str]) -> Limit:
+    def _taken(self, name: str, rivals: Mask) -> Array:
+        """Part of an effect's squared signature that each column takes at the size that suits it
+        best; nothing of those that are no rivals or do not show.
+        """
+        showing = rivals & (self._power > _NOTHING**2)
+        shared = self._free[self._best[name]] ** 2
+        return np.where(showing, shared, 0.0) / np.maximum(self._power, _NOTHING**2)
+
+    def _limit(self, start: Start, left: float, where: tuple[str, str]) -> Limit:
         """That of the start of an effect that shows most."""
-        name, power = str(start.effect), float(self._power[at])
+        name = str(start.effect)
+        power = float(self._power[self._best[name]])
         if left < _NOTHING or power <= 0.0:
             return Limit(name)
-        other = np.array([label != name for label in self._labels]) & (self._power > _NOTHING**2)
-        taken = np.where(other, self._free[at] ** 2, 0.0) / np.maximum(self._power, _NOTHING**2)
-        apart = np.sqrt(np.clip(power - taken, 0.0, None))
-        for label, distance in zip(self._labels, apart.tolist(), strict=True):
-            known = self._apart.get((name, label), math.inf)
-            self._apart[name, label] = min(known, distance)
+        taken = self._taken(name, self._labels != name)
         rival = int(np.argmax(taken))
-        distance = float(apart[rival])
+        distance = math.sqrt(max(power - float(taken[rival]), 0.0))
         named = Limit(
-            name, left, *where, seen=math.sqrt(power), distance=distance, rival=self._labels[rival]
+            name,
+            left,
+            *where,
+            seen=math.sqrt(power),
+            distance=distance,
+            rival=str(self._labels[rival]),
         )
         if not start.scalable:
             return named
         leading = start.sizes[0]
-        sizes = (DETECTED / named.seen, TOLD_APART / max(distance, 1e-300))
         return replace(
             named,
             size=leading,
             typical=abs(start.free[leading]),
-            seen_from=_sized(start, sizes[0]),
-            named_from=_sized(start, sizes[1]),
+            seen_from=_sized(start, DETECTED / named.seen),
+            named_from=_sized(start, TOLD_APART / max(distance, 1e-300)),
         )
 
-    def cosine(self, one: str, other: str) -> float:
-        """Cosine of the angle between two effects' signatures."""
-        i, j = (list(self.each).index(name) for name in (one, other))
-        size = math.sqrt(max(float(self.together[i, i] * self.together[j, j]), 1e-300))
-        return min(1.0, abs(float(self.together[i, j])) / size)
+    @cached_property
+    def unseparated(self) -> dict[tuple[str, str], float]:
+        """Effects that are seen at their typical sizes and not told apart there, with the cosine of
+        the angle between their signatures.
+        """
+        shown = [effect for effect, limit in self.each.items() if limit.seen >= DETECTED]
+        return {
+            pair: self._cosine(*pair)
+            for pair in itertools.combinations(shown, 2)
+            if self._apart(*pair) < TOLD_APART
+        }
 
-    def apart(self, one: str, other: str) -> float:
+    def _cosine(self, one: str, other: str) -> float:
+        """Cosine of the angle between two effects' signatures."""
+        i, j = self._best[one], self._best[other]
+        size = math.sqrt(max(float(self._power[i] * self._power[j]), 1e-300))
+        return min(1.0, abs(float(self._free[i, j])) / size)
+
+    def _apart(self, one: str, other: str) -> float:
         """Distance of two effects at their typical sizes, the smaller of both ways."""
-        return min(self._apart.get((a, b), math.inf) for a, b in ((one, other), (other, one)))
+        left = (
+            self._power[self._best[a]] - self._taken(a, self._labels == b).max()
+            for a, b in ((one, other), (other, one))
+        )
+        return math.sqrt(max(min(map(float, left)), 0.0))
 
 
 def _sized(start: Start, size: float) -> float:

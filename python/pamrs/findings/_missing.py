@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -63,24 +63,21 @@ class MissingRecording(Entry):
         """An argument at each value (n,); the time by its name."""
         return self.time if argument == "time" else self.arguments[argument]
 
-    def at(self, rows: Any, digits: int = 17) -> MissingRecording:
-        """Some of its points, with so many digits."""
-
-        def some(values: Array) -> Array:
-            return np.array([float(f"{v:.{digits}g}") for v in values[rows]])
-
+    def each(self, change: Callable[[Array], Array]) -> MissingRecording:
+        """The same with each of its curves changed: some of their points, or fewer digits."""
         return replace(
             self,
-            time=some(self.time),
-            value=some(self.value),
-            std=some(self.std),
-            arguments={n: some(v) for n, v in self.arguments.items()},
-            law=None if self.law is None else some(self.law),
+            time=change(self.time),
+            value=change(self.value),
+            std=change(self.std),
+            arguments={n: change(v) for n, v in self.arguments.items()},
+            law=None if self.law is None else change(self.law),
         )
 
     def thinned(self, most: int) -> MissingRecording:
         """Thin it to so many points at most, of six digits."""
-        return self.at(slice(None, None, max(1, -(-self.time.size // most))), 6)
+        every = slice(None, None, max(1, -(-self.time.size // most)))
+        return self.each(lambda v: np.array([float(f"{x:.6g}") for x in v[every]]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,12 +62,13 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
     if len(data) < 3:
         return []
     if np.all(data == data[0]):
+        if len(data) < _LEAST:
+            return []
         masked, text = (
             row.has("clips") and not row.has("steady"),
             "one and the same value throughout",
         )
-        whole = Fault("constant", int(good[0]), int(good[-1]) + 1, text, masked)
-        return [whole] if len(data) >= _LEAST else []
+        return [Fault("constant", int(good[0]), int(good[-1]) + 1, text, masked)]
     faults = _rails(data, good)
     for fault in faults:
         good = good[(good < fault.start) | (good >= fault.stop)]

@@ -383,12 +383,12 @@ class _Drawing:
         lit = name == (self.diagnosis.answer.block or self.diagnosis.where.block)
         left = left_in(self.diagnosis, name, "refit")
         missed = mismatch and miss(self.diagnosis, mismatch.channel, "refit")
-        if missed and format_number(missed.noises, 2) == "1.0":
-            left = "noise"
+        times = format_number(missed.noises, 2) if missed else ""
+        left = "noise" if times == "1.0" else left
+        begins = {"error": "usual error: ", "more": "misses "}.get(left)
         size = "fits to the noise" if left == "noise" else ""
-        if left in ("error", "more") and missed:
-            usual = "usual error: " if left == "error" else "misses "
-            size = f"{usual}{format_number(missed.noises, 2)} × noise"
+        if begins and times:
+            size = f"{begins}{times} × noise"
         colour = COLOURS["before"] if lit or left == "more" else "#8a94a3"
         text = textwrap.shorten(size, int((right - x) / 6.4), placeholder=" …")
         return dict(x=x, y=y, right=right, low=low, title=title, lit=lit, colour=colour, text=text)

@@ -565,12 +565,7 @@ def simulate(
     core = core_rig(rig)
     kept = 1 + len(core.inputs) + len(core.channels if wanted is None else wanted)
     asked = by_signal(valve_command, supply_command, length, pressure)
-    long = [  # what says how many rows there are
-        name
-        for name, signal in asked.items()
-        for one in (signal.values() if isinstance(signal, Mapping) else [signal])
-        if one is not None and np.ndim(one) > 0
-    ]
+    long = [name for name, signal in asked.items() if _is_long(signal)]
     rows = None if duration is None else rows_of(duration, sample_time, long)
     check_rows(kept, rows or 0)
     signals, count = signals_of(rig, asked, rows)
@@ -649,6 +644,12 @@ def loop_samples(
         )
     every = whole_samples("period", sample_time if period is None else period, sample_time, least=1)
     return every, whole_samples("duration", duration, sample_time, least=0)
+
+
+def _is_long(signal: Signals | None) -> bool:
+    """True where a signal, or one of several, says how many rows there are."""
+    each = signal.values() if isinstance(signal, Mapping) else [signal]
+    return any(np.ndim(one) > 0 for one in each if one is not None)
 
 
 def rows_of(duration: float, sample_time: float, setting: Iterable[str]) -> int:

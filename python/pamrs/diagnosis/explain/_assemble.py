@@ -32,6 +32,7 @@ from pamrs.diagnosis.fit import (
     known_parameters,
 )
 from pamrs.diagnosis.model import (
+    DETERMINED_SHARE,
     Conclusion,
     Models,
     owners_of_effects,
@@ -64,8 +65,6 @@ from pamrs.rig import Rig
 
 # [noise levels] gap of refit to noise below which nothing is said of how much closes
 _LEAST_GAP = 0.05
-# [tolerances] standard deviation below which a parameter counts as determined by the recordings
-_DETERMINED_SHARE = 0.7
 # [standard deviations] moved, from which a parameter counts as determined too
 _DETERMINED_MOVE = 2.0
 
@@ -464,7 +463,7 @@ def _parameters(
             std=own.std[name],
             unit=p.unit,
             moved_sigmas=(own.values[name] - p.value) / p.tol,
-            identifiable=own.std[name] < max(_DETERMINED_SHARE * p.tol, moved / _DETERMINED_MOVE),
+            identifiable=own.std[name] < max(DETERMINED_SHARE * p.tol, moved / _DETERMINED_MOVE),
         )
     return out
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pamrs._arrays import Array, Mask
+from pamrs._arrays import Array, Mask, stretches
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.fit import Key
 from pamrs.diagnosis.noise import NoiseLevel, bins_of
@@ -237,8 +237,7 @@ def _intervals(flags: Mask, bin_time: float, most: int = 12) -> list[list[float]
     # bridge single bins, keep the longest stretches
     bridged = flags.copy()
     bridged[1:-1] |= flags[:-2] & flags[2:]
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], bridged.astype(int), [0]])))
-    spans = sorted(zip(edges[::2], edges[1::2], strict=True), key=lambda s: s[0] - s[1])[:most]
+    spans = sorted(stretches(bridged), key=lambda s: s[0] - s[1])[:most]
     return [
         [round(float(a * bin_time), 3), round(float(b * bin_time), 3)] for a, b in sorted(spans)
     ]

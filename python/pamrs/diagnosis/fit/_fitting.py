@@ -415,9 +415,10 @@ class Scaling:
         self.centre = {n: known[n].value for n in baseline}
         walls = settings.most_tolerances
         ends = [ends_in_tolerances(known[n], walls, freed=n in freed) for n in baseline]
+        self.most = {name: largest_value(nominal, name) for name in starts}
         lower, upper = [low for low, _ in ends], [high for _, high in ends]
         for name, start in starts.items():
-            info, most = find_parameter(name), largest_value(nominal, name)
+            info, most = find_parameter(name), self.most[name]
             if _logarithmic(name):
                 lower.append(math.log(max(info.lower, start * 1e-3) / start))
                 upper.append(math.log(min(most, start * 1e3) / start))
@@ -435,7 +436,7 @@ class Scaling:
         """A parameter [SI] from its scaled number."""
         if name in self.centre:
             return moved_value(self.known[name], x)
-        info, most = find_parameter(name), largest_value(self.nominal, name)
+        info, most = find_parameter(name), self.most[name]
         found = self.starts[name] * math.exp(x) if _logarithmic(name) else x * self.scale[name]
         return min(max(found, info.lower, -most), most)
 

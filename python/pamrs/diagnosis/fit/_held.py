@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any
 
 from pamrs.diagnosis.fit._starts import CHOSEN
@@ -107,7 +106,6 @@ def _is_positive(known: Parameter) -> bool:
     return known.lower >= 0.0 < known.value
 
 
-@lru_cache(maxsize=512)
 def largest_value(rig: Rig, name: str) -> float:
     """Largest value of an effect's parameter that a rig can have [SI]: no friction is larger than
     the pull of the muscle, no reading drifts by more than a tenth of the pressure that there can be
@@ -119,15 +117,15 @@ def largest_value(rig: Rig, name: str) -> float:
         return own.upper
     pressures = [t["initial_pressure"] for t in rig.tables("supply").values()]
     pressure = max([rig.limits.get("max_pressure", 0.0), *pressures]) or _USUAL_PRESSURE
-    pulls = [rig.muscle_of(m).force(pressure, 0.0) for m in rig.tables("muscle")]
-    counts = [float(t["count"]) for t in rig.tables("muscle").values()]
-    pull = max(map(float, pulls), default=math.inf)
-    if most == "pull":
-        return min(own.upper, pull)
-    if most == "pull per pressure":
-        return min(own.upper, pull / pressure)
-    every = pull * max(counts, default=1.0) if own.unit == "N" else pressure
-    return min(own.upper, _MOST_DRIFT * every)
+    muscles = rig.tables("muscle")
+    pull = max((float(rig.muscle_of(m).force(pressure, 0.0)) for m in muscles), default=math.inf)
+    count = max((float(t["count"]) for t in muscles.values()), default=1.0)
+    sizes = {
+        "pull": pull,
+        "pull per pressure": pull / pressure,
+        "drift": _MOST_DRIFT * (pull * count if own.unit == "N" else pressure),
+    }
+    return min(own.upper, sizes[most])
 
 
 def moved_value(known: Parameter, tolerances: float) -> float:

@@ -133,48 +133,50 @@ def times_of(recordings: Sequence[MissingRecording]) -> list[MissingTime]:
     edges under which its squares in and outside of them are the most probable ones of two normal
     distributions.
     """
-    free = [np.ones(own.time.size, dtype=bool) for own in recordings]
+    squares = [own.value**2 for own in recordings]
+    free = [np.ones(square.size, dtype=bool) for square in squares]
     found = list[MissingTime]()
     while len(found) < _MOST_TIMES:
-        best = max(
-            (_clearest(k, recordings, free) for k in range(len(recordings))), key=lambda own: own[0]
-        )
-        if best[0] <= 0.0:
+        each = [_clearest(k, squares, free) for k in range(len(recordings))]
+        k = max(range(len(each)), key=lambda k: each[k][0])
+        gain, (start, stop), ratio = each[k]
+        if gain <= 0.0:
             break
-        found.append(best[1])
-        k = [own.recording for own in recordings].index(best[1].recording)
-        free[k] &= (recordings[k].time < best[1].start) | (recordings[k].time > best[1].stop)
+        own = recordings[k]
+        found.append(
+            MissingTime(own.recording, float(own.time[start]), float(own.time[stop - 1]), ratio)
+        )
+        free[k][start:stop] = False
     return found
 
 
 def _clearest(
-    k: int, recordings: Sequence[MissingRecording], free: Sequence[NDArray[np.bool_]]
-) -> tuple[float, MissingTime]:
-    """Times in one recording between which the input differs most from what it is elsewhere, with
-    the gain in log likelihood; none where it is not much larger there.
+    k: int, squares: Sequence[Array], free: Sequence[NDArray[np.bool_]]
+) -> tuple[float, tuple[int, int], float]:
+    """Rows of one recording between which the squares differ most from what they are elsewhere:
+    gain in log likelihood, zero where they are not much larger there; first row and one past the
+    last; ratio of the roots of their means.
     """
-    own = recordings[k]
-    power = np.concatenate([[0.0], np.cumsum(np.where(free[k], own.value**2, 0.0))])
-    count = np.concatenate([[0.0], np.cumsum(free[k])])
-    parts = [r.value[f] ** 2 for r, f in zip(recordings, free, strict=True)]
+    power, count = (
+        np.concatenate([[0.0], np.cumsum(own)]) for own in (squares[k] * free[k], free[k])
+    )
+    parts = [square[own] for square, own in zip(squares, free, strict=True)]
     all_power = math.fsum(float(np.sum(part)) for part in parts)
     all_count = float(sum(part.size for part in parts))
-    edges = np.unique(np.linspace(0, own.time.size, _EDGES + 1).astype(int))
+    whole = math.fsum(float(np.sum(square)) for square in squares)
+    edges = np.unique(np.linspace(0, squares[k].size, _EDGES + 1).astype(int))
     a, b = (edges[i] for i in np.triu_indices(edges.size, 1))
     inside, within = power[b] - power[a], count[b] - count[a]
     least = 1e-12 * all_power + 1e-300
-    whole = math.fsum(float(np.sum(r.value**2)) for r in recordings)
     high = (inside + least) / np.maximum(within, 1.0)
     low = (all_power - inside + least) / np.maximum(all_count - within, 1.0)
     gain = all_count * np.log((all_power + least) / all_count)
     gain = gain - within * np.log(high) - (all_count - within) * np.log(low)
-    clear = (high > _MUCH_LARGER**2 * low) & (b - a < _MOST_OF_TIME * own.time.size)
+    clear = (high > _MUCH_LARGER**2 * low) & (b - a < _MOST_OF_TIME * squares[k].size)
     clear &= (within == b - a) & (inside > _LEAST_OF_SQUARE * whole)
-    gain = np.where(clear, gain, 0.0)
-    best = int(np.argmax(gain))
-    start, stop = float(own.time[a[best]]), float(own.time[b[best] - 1])
-    ratio = math.sqrt(float(high[best] / low[best]))
-    return float(gain[best]), MissingTime(own.recording, start, stop, ratio)
+    best = int(np.argmax(np.where(clear, gain, 0.0)))
+    rows = int(a[best]), int(b[best])
+    return float(gain[best] * clear[best]), rows, math.sqrt(float(high[best] / low[best]))
 
 
 def with_words(found: MissingInput) -> MissingInput:
@@ -191,14 +193,15 @@ def with_words(found: MissingInput) -> MissingInput:
         With ``argument``, ``explained``, ``sentence`` and ``times``.
     """
     argument, share, sentence = _explained(found)
-    times = times_of(found.recordings)
-    inside = [part for own in found.recordings for part in _during(own, times)]
+    times = [] if 1.0 - share < _LEFT_BESIDE_TIMES else times_of(found.recordings)
+    inside = [
+        _during(own, t) for own in found.recordings for t in times if t.recording == own.recording
+    ]
     whole, there = (
         math.fsum(float(np.sum(own.value**2)) for own in part)
         for part in (found.recordings, inside)
     )
-    least = max(_LEFT_BESIDE_TIMES, _MORE_THAN_OTHER_TIMES * (1.0 - there / whole))
-    if not times or 1.0 - share < least:
+    if not times or 1.0 - share < _MORE_THAN_OTHER_TIMES * (1.0 - there / whole):
         return replace(found, argument=argument, explained=share, sentence=sentence)
     _, _, sentence = _explained(replace(found, recordings=inside))
     spans = [f"from {t.start:.1f} to {t.stop:.1f} s of {t.recording}" for t in times]
@@ -207,13 +210,10 @@ def with_words(found: MissingInput) -> MissingInput:
     return replace(found, argument="time", explained=there / whole, sentence=sentence, times=times)
 
 
-def _during(own: MissingRecording, times: Sequence[MissingTime]) -> list[MissingRecording]:
-    """The parts of a recording between some times."""
-    return [
-        own.at((own.time >= t.start) & (own.time <= t.stop))
-        for t in times
-        if t.recording == own.recording
-    ]
+def _during(own: MissingRecording, time: MissingTime) -> MissingRecording:
+    """The part of a recording between the ends of a time."""
+    rows = (own.time >= time.start) & (own.time <= time.stop)
+    return own.each(lambda values: values[rows])
 
 
 def _explained(found: MissingInput) -> tuple[str, float, str]:

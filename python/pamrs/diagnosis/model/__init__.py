@@ -2,14 +2,20 @@
 recordings at every stage, the budget of each block, and the whole rig from its commands alone.
 
 Public: `conclude`, `Conclusion`, `Models`, `with_std`, `spoiled_channels`, `owners_of_effects`,
-`owners_of_parameters` (whose value the model has), `said_of_constants` (free runs).
+`owners_of_parameters` (whose value the model has), `DETERMINED_SHARE` (from when recordings tell
+one), `said_of_constants` (free runs).
 """
 
-from pamrs.diagnosis.model._budget import owners_of_effects, owners_of_parameters
+from pamrs.diagnosis.model._budget import (
+    DETERMINED_SHARE,
+    owners_of_effects,
+    owners_of_parameters,
+)
 from pamrs.diagnosis.model._conclude import Conclusion, Models, conclude, spoiled_channels, with_std
 from pamrs.diagnosis.model._free_run import said_of_constants
 
 __all__ = [
+    "DETERMINED_SHARE",
     "Conclusion",
     "Models",
     "conclude",

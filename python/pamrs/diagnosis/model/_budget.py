@@ -38,8 +38,8 @@ from pamrs.rig import Parameter, Rig
 
 # weightings of pieces for a share's interval: ten of them lie beyond each 95 % end
 _BUDGET_DRAWS = 400
-# [tolerances] standard deviation below which a parameter counts as determined by the recordings
-_DETERMINED_SHARE = 0.7
+DETERMINED_SHARE = 0.7
+"""Standard deviation [tolerances] below which the recordings determine a parameter."""
 
 
 _NAMED = ("wrong_parameter", "effect")
@@ -381,7 +381,7 @@ def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
     def spread(k: int, name: str) -> float:
         own = candidates[k].fit
         std = own.std.get(name, math.inf) if own.events is None else 0.0
-        return min(std, _DETERMINED_SHARE * own.scales[name]) if name in own.scales else std
+        return min(std, DETERMINED_SHARE * own.scales[name]) if name in own.scales else std
 
     found: dict[str, int] = {}
     for k, candidate in enumerate(candidates):

@@ -38,7 +38,7 @@ from pamrs.rig import Rig, named_entries
 from pamrs.simulation import Simulation, core_rig, has_frame, reading
 
 # realisations of the drives' noise for an experiment's noise level: a fifth is enough
-_REPLICATES = 4
+REPLICATES = 4
 # relative standard deviation of an effect's parameter of which a model says none
 _UNSTATED_STD_SHARE = 0.5
 # [Pa] of a pressure where no recording tells: usual 14 bar transducer, 16-bit converter
@@ -233,7 +233,7 @@ def weights_of(problem: Problem, rig: Rig) -> dict[Key, float]:
     """Noise level of a block's bin means over a recording, as a multiple of its white part: what
     drives' noise adds (>= 1).
     """
-    few = replace(problem.settings, noise_replicates=_REPLICATES)
+    few = replace(problem.settings, noise_replicates=REPLICATES)
     fewer = replace(problem, settings=few)
     found = noise_levels(fewer, core_rig(rig))
     out = {}

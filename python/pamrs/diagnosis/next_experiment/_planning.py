@@ -4,18 +4,19 @@ cannot tell from each other: the limits of a few standard experiments, which are
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
+from pamrs._arrays import Array
 from pamrs._progress import Steps
 from pamrs.diagnosis.fit import Problem, Start, free_baseline
 from pamrs.diagnosis.limits import Limits, Products, possible_starts, products_of
 from pamrs.diagnosis.next_experiment._differences import (
+    REPLICATES,
     checked_channels,
     measurable,
     noise_of,
@@ -30,15 +31,11 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments import Experiment, library
-from pamrs.findings import DETECTED, TOLD_APART, Limit
+from pamrs.findings import DETECTED
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
-from pamrs.simulation import Simulation, core_rig
-
-# realisations of the drives' noise for an experiment's noise level: a fifth is enough
-_REPLICATES = 4
-
+from pamrs.simulation import core_rig
 
 BASIC = (
     "multisine",
@@ -52,17 +49,6 @@ BASIC = (
     "slow_strokes",
 )
 """Kinds of experiments that a plan assumes by default, those of them that the rig can do."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Picture:
-    """Limits by a choice of blocks and experiments, and the effects not told apart, with the cosine
-    of their signatures.
-    """
-
-    limits: dict[str, Limit]
-    unseparated: dict[tuple[str, str], float]
-    bits: float
 
 
 def plan_diagnosis(
@@ -129,23 +115,24 @@ def plan_diagnosis(
     layers = _layers(rig, own, every)
     together = [block for _, blocks in layers for block in blocks]
     free = list(free_baseline(Problem(together, [], core_rig(rig), settings), rig))
-    runs = {name: (e.changed(rig), e.simulate(rig)) for name, e in pool.items()}
-    products: Products = {}
-    usable, tell = dict(pool), Steps(progress)
-    recorded = [(cut, _recorded(cut, runs, sound, channels, settings)) for channels, cut in layers]
-    for done, name in enumerate(pool):
-        tell(name, done / len(pool))
+    recorded = _recorded(rig, pool, layers, sound, settings)
+    products: dict[tuple[Block, str], Array] = {}
+    usable, tell = {}, Steps(progress)
+    for done, (name, each) in enumerate(recorded.items()):
+        tell(name, done / len(recorded))
+        stands = pool[name].changed(rig)
         try:
-            for cut, prepared in recorded:
-                found = _products(cut, runs[name][0], name, prepared, starts, free, settings)
-                products = {**products, **found}
+            for k, (_, cut) in enumerate(layers):
+                visited = [own[k] for own in recorded.values()]
+                products |= _products(cut, stands, each[k], visited, starts, free, settings)
         except SimulationError:
-            del usable[name]  # the cut chain leaves the range of the model there
+            continue  # the cut chain leaves the range of the model there
+        usable[name] = pool[name]
     chosen = [name for name in chosen if name in usable]
     blocks = available_blocks(rig, own)
     assumed = _Assumed(rig, products, starts, free, settings)
-    now = assumed.picture(blocks, chosen)
-    order = list(now.limits)
+    now = assumed.limits(blocks, chosen)
+    order = list(now.each)
     pairs = [(a, b, cosine) for (a, b), cosine in now.unseparated.items()]
     return Plan(
         rig=rig.name,
@@ -160,7 +147,7 @@ def plan_diagnosis(
         experiments=[
             {"name": n, "text": usable[n].text, "duration": usable[n].duration} for n in chosen
         ],
-        limits=list(now.limits.values()),
+        limits=list(now.each.values()),
         pairs=pairs,
         groups=_joined([(a, b) for a, b, _ in pairs], order),
         additions=assumed.additions(own, every, chosen, usable),
@@ -184,22 +171,14 @@ class _Assumed:
         """Blocks that some channels tell apart."""
         return available_blocks(self.rig, checked_channels(self.rig, channels))
 
-    def picture(self, blocks: list[Block], experiments: Sequence[str]) -> _Picture:
+    def limits(self, blocks: list[Block], experiments: Sequence[str]) -> Limits:
         """Limits by some blocks over some experiments."""
         used = {
             (block, name): values
             for (block, name), values in self.products.items()
             if block in blocks and name in experiments
         }
-        found = Limits(used, self.starts, self.baseline, self.settings)
-        shown = [e for e, limit in found.each.items() if limit.seen >= DETECTED]
-        unseparated = {
-            (a, b): found.cosine(a, b)
-            for a, b in itertools.combinations(shown, 2)
-            if found.apart(a, b) < TOLD_APART
-        }
-        _, logarithm = np.linalg.slogdet(np.eye(len(found.together)) + found.together)
-        return _Picture(found.each, unseparated, 0.5 * float(logarithm) / math.log(2.0))
+        return Limits(used, self.starts, self.baseline, self.settings)
 
     def needed(self, block: str, own: tuple[str, ...], every: tuple[str, ...]) -> list[str]:
         """The fewest channels that, added to those at hand, surround a block."""
@@ -221,18 +200,18 @@ class _Assumed:
         experiment would add.
         """
         blocks = self.blocks(own)
-        now = self.picture(blocks, chosen)
+        now = self.limits(blocks, chosen)
         lacking = [c for c in every if c not in own]
         found = []
         for channel in lacking:
-            then = self.picture(self.blocks((*own, channel)), chosen)
+            then = self.limits(self.blocks((*own, channel)), chosen)
             found.append(_addition("channel", channel, spoken_name(channel), now, then))
         for several in itertools.combinations(lacking, 2) if not blocks else ():
             text = " and ".join(map(spoken_name, several))
-            then = self.picture(self.blocks((*own, *several)), chosen)
+            then = self.limits(self.blocks((*own, *several)), chosen)
             found.append(_addition("channels", "+".join(several), text, now, then))
         for name in [n for n in usable if n not in chosen] if blocks else ():
-            then = self.picture(blocks, [*chosen, name])
+            then = self.limits(blocks, [*chosen, name])
             found.append(_addition("experiment", name, usable[name].text, now, then))
         return sorted(found, key=lambda a: (-(len(a.seen) + len(a.separated)), -a.bits))
 
@@ -324,41 +303,47 @@ def _described(rig: Rig, block: Block, blocks: list[Block]) -> dict[str, Any]:
 
 
 def _recorded(
-    blocks: list[Block],
-    runs: Mapping[str, tuple[Rig, Simulation]],
+    rig: Rig,
+    pool: Mapping[str, Experiment],
+    layers: Sequence[tuple[tuple[str, ...], list[Block]]],
     noise: Mapping[str, float],
-    channels: tuple[str, ...],
     settings: DiagnosisSettings,
-) -> dict[str, Prepared]:
-    """Experiments as recordings of some channels, ready for the cut chain."""
-    heard = {c: v for c, v in noise.items() if c in channels}
-    return {
-        name: begun_alike(blocks, core_rig(rig), taken(run, rig, name, heard, settings))
-        for name, (rig, run) in runs.items()
-    }
+) -> dict[str, list[Prepared]]:
+    """Experiments as recordings of the channels of each layer, ready for the cut chain; without
+    those in which the model leaves its range.
+    """
+    found = {}
+    for name, experiment in pool.items():
+        stands = experiment.changed(rig)
+        with contextlib.suppress(SimulationError):
+            run = experiment.simulate(rig)
+            found[name] = [
+                begun_alike(blocks, core_rig(stands), taken(run, stands, name, heard, settings))
+                for channels, blocks in layers
+                for heard in [{c: v for c, v in noise.items() if c in channels}]
+            ]
+    return found
 
 
 def _products(
     blocks: list[Block],
     rig: Rig,
-    name: str,
-    recorded: Mapping[str, Prepared],
+    prepared: Prepared,
+    visited: list[Prepared],
     starts: Sequence[Start],
     baseline: Sequence[str],
     settings: DiagnosisSettings,
 ) -> Products:
     """Products of all that one experiment shows; the model's error runs over what all visit."""
-    few = replace(settings, noise_replicates=_REPLICATES)
-    problem = Problem(blocks, [recorded[name]], core_rig(rig), few)
+    few = replace(settings, noise_replicates=REPLICATES)
+    problem = Problem(blocks, [prepared], core_rig(rig), few)
     stated = model_error(rig, settings.usual_error)
-    level = noise_levels(problem, problem.core, stated, visited=list(recorded.values()))
+    level = noise_levels(problem, problem.core, stated, visited)
     return products_of(problem, rig, starts, baseline, level)
 
 
-def _addition(kind: str, name: str, text: str, now: _Picture, then: _Picture) -> Addition:
-    seen = tuple(
-        e for e, limit in then.limits.items() if limit.seen >= DETECTED > now.limits[e].seen
-    )
+def _addition(kind: str, name: str, text: str, now: Limits, then: Limits) -> Addition:
+    seen = tuple(e for e, limit in then.each.items() if limit.seen >= DETECTED > now.each[e].seen)
     separated = tuple(sorted(now.unseparated.keys() - then.unseparated.keys()))
     return Addition(kind, name, text, seen, separated, then.bits - now.bits)
 

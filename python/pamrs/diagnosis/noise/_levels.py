@@ -206,9 +206,7 @@ def noise_levels(
             bent = None
             if known:
                 bent = curves(block, core, base, prepared, ranges[block.name], known, width)
-            # curves that are one standard deviation high: their squares are variances
-            spread = np.zeros((0, 0)) if bent is None else bent[seen]
-            error = float(np.mean(np.sum(spread**2, axis=1))) if spread.size else 0.0
+            error = 0.0 if bent is None else _power(bent[seen])
             found[key] = NoiseLevel(
                 math.sqrt(base.noise**2 + sample),
                 scatter=scatter,
@@ -315,6 +313,11 @@ def _with_error(noise: float, error: float) -> dict[str, float]:
         "beside": math.sqrt(noise + rest),
         "rest": rest / (noise + rest),
     }
+
+
+def _power(curves: Array) -> float:
+    """Variance of bin means by curves that are one standard deviation high."""
+    return float(np.mean(np.sum(curves**2, axis=1))) if curves.size else 0.0
 
 
 def _own(

@@ -12,7 +12,7 @@ from scipy.signal import savgol_filter
 from scipy.stats import chi2, norm
 
 from pamrs import _core
-from pamrs._arrays import Array, Index, Mask
+from pamrs._arrays import Array, Index, Mask, stretches
 from pamrs.channels import block_of, channel_of, dotted, with_trait
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
@@ -421,10 +421,7 @@ def smoothed(values: Array, dt: float, lengths: Lengths) -> tuple[Array, Array]:
 
 def _long_holes(mask: Mask, bridged: int) -> list[tuple[int, int]]:
     """First sample of each hole that is not bridged, and the first after it."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (~mask).astype(np.int8), [0]])))
-    return [
-        (int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > bridged
-    ]
+    return [(a, b) for a, b in stretches(~mask) if b - a > bridged]
 
 
 def _steps(command: Array, a: int, b: int) -> bool:
