@@ -201,7 +201,7 @@ class Case(View):
         return cls(name, rig, made, Path())
 
     def with_rig(self, rig: Rig, file: str | os.PathLike[str] | None = None) -> Case:
-        """The same recordings with another rig.
+        """Copy of the case whose recordings are modelled by another rig.
 
         Parameters
         ----------
@@ -319,7 +319,7 @@ def _document(file: Path, given: Path) -> dict[str, Any]:
 
 
 def _outside(home: Path, document: Mapping[str, Any]) -> list[str]:
-    """Files that lie outside the case folder."""
+    """Problems of rig and recording files that lie outside the case folder."""
     entries = document.get("recording")
     named = [("rig", document.get("rig", _RIG))] + [
         (f"recording[{index}].file", entry.get("file"))
@@ -402,7 +402,7 @@ def _recordings(
 
 
 def _once(recording: Recording, told: set[tuple[str, str, str]]) -> Recording:
-    """The same without what was said of its file with a recording before."""
+    """Copy of a recording without remarks on its log that an earlier recording of that file has."""
     issues = []
     for issue in recording.issues:
         said = (recording.source, issue.channel, issue.text)
@@ -414,9 +414,7 @@ def _once(recording: Recording, told: set[tuple[str, str, str]]) -> Recording:
 
 
 def _on_its_turn(recording: Recording, rig: Rig | None) -> Recording:
-    """The same with angles that are whole turns outside what the rig allows moved there: encoders
-    without a leap in one recording, and with one in another, count from different turns.
-    """
+    """Move joint angles outside the rig's limits back by whole turns (2 pi) where that fits."""
     for name, values in recording.channels.items():
         limits, used = limits_of(rig, name), recording.mask[name]
         if limits is None or channel_of(name) != "joint_angle" or not used.any():
@@ -437,7 +435,7 @@ def _on_its_turn(recording: Recording, rig: Rig | None) -> Recording:
 def _own_values(
     problems: list[str], label: str, given: Any, rig: Rig | None
 ) -> dict[str, OwnValue]:
-    """Parameters that had another value in a recording."""
+    """Parameter values that hold in one recording alone, by name, from its table ``parameters``."""
     if not isinstance(given, Mapping):
         problems.append(
             f"{label}parameters = {given!r} is not allowed: a table of parameters of the rig, such "
@@ -454,7 +452,7 @@ def _own_values(
 
 
 def _own_value(name: str, entry: Any, rig: Rig | None) -> OwnValue:
-    """One of them."""
+    """Parameter value of one recording, from its entry in ``case.toml``, converted to SI."""
     table = dict(entry) if isinstance(entry, Mapping) else {"value": entry}
     value, unit, error = (table.pop(key, None) for key in ("value", "unit", "error"))
     if error == "own" and value is None and unit is None and rig is not None and not table:

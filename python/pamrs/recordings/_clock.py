@@ -91,7 +91,7 @@ class Grid:
         self._place_samples()
 
     def _place_samples(self) -> None:
-        """Between which stamps each sample lies, and whether these are near enough."""
+        """Find the stamps around each grid sample, and the samples that lie in no gap."""
         stamps, step, usual = self._stamps, self.sample_time, self.usual
         right = np.clip(np.searchsorted(stamps, self.time, side="left"), 1, len(stamps) - 1)
         self._left, self._right = right - 1, right
@@ -107,7 +107,7 @@ class Grid:
 
     @property
     def interpolates(self) -> bool:
-        """Whether it has clearly more samples than were recorded."""
+        """True where the grid is more than `GAP` times as fine as the recorded samples."""
         return math.isfinite(self.usual) and self.usual > GAP * self.sample_time
 
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
@@ -233,12 +233,12 @@ def usual_interval(forward: Array, count: int) -> float:
 
 
 def _between(placed: Array, first: Place, last: Place, text: str, kind: str = "gap") -> Event:
-    """Something from the beginning of one interval to the end of another."""
+    """Event from the beginning of one interval between stamps to the end of another."""
     return Event(kind, float(placed[first]), float(placed[last + 1]), text)
 
 
 def gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event]:
-    """Where samples are missing.
+    """Gaps of a clock: one event each, or a single one that sums them up where they are many.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ def _match(cell: str) -> re.Match[str] | None:
 
 
 def is_moment(cell: str) -> bool:
-    """Whether a text is a time of day, perhaps with a date before it."""
+    """True where a text is a time of day, perhaps with a date before it."""
     return _match(cell) is not None
 
 
@@ -101,9 +101,7 @@ def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
 
 
 def _through_the_autumn(seconds: Array) -> tuple[Array, int]:
-    """Times of a clock that was set back by an hour while it went on, and the row after which; -1
-    where it never was.
-    """
+    """Times with an hour added after the clock was set back, and the row before; -1 for none."""
     rows = np.flatnonzero(np.isfinite(seconds))
     steps = np.diff(seconds[rows])
     back = np.flatnonzero(steps < 0.0)
@@ -117,7 +115,7 @@ def _through_the_autumn(seconds: Array) -> tuple[Array, int]:
 
 
 def _order(there: dict[str, re.Match[str]]) -> tuple[bool, str]:
-    """Whether months stand before days, which only days above 12 show; else a slash means so."""
+    """True where months come before days, and a remark; numbers above 12 decide, then the slash."""
     dates = {
         (m["a"], m["mark"], m["b"], m["c"]) for m in there.values() if m["a"] and len(m["a"]) < 4
     }

@@ -76,7 +76,7 @@ def ambient_of(rig: Rig) -> float:
 
 
 def limits_of(rig: Rig | None, name: str) -> tuple[float, float] | None:
-    """Where a rig lets an angle or a length be [SI].
+    """Smallest and largest angle or length that a rig allows a joint or a load [SI].
 
     Parameters
     ----------
@@ -137,13 +137,13 @@ def suspicions(
 
 
 def _other(values: Array | float, said: str, other: str) -> Array | float:
-    """SI values if the numbers were in another unit."""
+    """SI values of a channel if its numbers were in the unit `other`, not in the unit `said`."""
     one, two = parse_unit(said), parse_unit(other)
     return (values - one.offset) / one.scale * two.scale + two.offset
 
 
 def _as_large(one: str, two: str) -> bool:
-    """Whether two units are of the same size."""
+    """True where two units have the same scale."""
     return abs(parse_unit(one).scale / parse_unit(two).scale - 1.0) < 1e-9
 
 
@@ -196,7 +196,7 @@ def _fed_by(
 def _recorded_supply(
     channels: Mapping[str, Array], said: Mapping[str, str], rig: Rig | None
 ) -> float:
-    """The highest recorded pressure of a supply, in the unit that is likelier; 0 without one."""
+    """Highest recorded supply pressure [Pa], in its likeliest unit; 0 where none was recorded."""
     tops = [0.0]
     for name, values in channels.items():
         if channel_of(name) != "supply_pressure":
@@ -209,7 +209,7 @@ def _recorded_supply(
 
 
 def _rated(name: str, channels: Mapping[str, Array], rig: Rig | None) -> tuple[float, str] | None:
-    """What the rig file, or the command of a regulator, says of a supply."""
+    """Largest pressure [Pa] of a supply by rig file or regulator's command, and words on it."""
     rated: list[tuple[float, str]] = []
     for block, table in (rig.tables("supply") if rig else {}).items():
         if channel_of(name) == "supply_pressure" and dotted("supply_pressure", block) != name:
@@ -261,9 +261,7 @@ def _pressure(
 def _agrees(
     name: str, top: float, unit: str, channels: Mapping[str, Array], said: Mapping[str, str]
 ) -> bool:
-    """Whether another pressure, or its command, goes as far although it was logged in another unit:
-    two units are not wrong by the same factor.
-    """
+    """True where another pressure in another unit is as high, which supports both units."""
     for other, values in channels.items():
         own = said.get(other, "")
         if other == name or not own or channel_of(other) not in (*PRESSURES, "supply_command"):
@@ -274,7 +272,9 @@ def _agrees(
 
 
 def _fitting(top: float, unit: str, reference: float, least: float, most: float) -> str:
-    """The unit of pressure with which the largest value fits; the first one, for there are few."""
+    """First other unit of pressure that puts the maximum between two shares of a reference, else
+    "".
+    """
     for other in _UNITS:
         fits = least <= float(_other(top, unit, other)) / reference <= most
         if fits and not _as_large(other, unit):
@@ -283,7 +283,7 @@ def _fitting(top: float, unit: str, reference: float, least: float, most: float)
 
 
 def _absolute(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Suspicion]:
-    """A lowest level, at which it rests, that is the ambient pressure, or a vacuum."""
+    """Doubt pressures that rest at the ambient (likely absolute) or a vacuum (likely gauge)."""
     good = values[np.isfinite(values)]
     if good.size < 20:
         return
@@ -315,9 +315,7 @@ def _absolute(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[
 
 
 def _in_both(unit: str, si: str, rig: Rig | None, *values: float) -> str:
-    """Values in the unit of the log, and in brackets in that of the rig file where that is
-    another.
-    """
+    """Values in the unit of the log, and in that of the rig file where it differs."""
     own = unit if rig is None else rig.units.usual(si)
     said = in_words(unit, si, *values)
     return said if _as_large(own, unit) else f"{said} ({in_words(own, si, *values)})"
@@ -343,7 +341,7 @@ def _temperature(name: str, unit: str, values: Array, rig: Rig | None) -> Iterat
 
 
 def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Suspicion]:
-    """An angle or a length beside the ends that the rig file gives, else beside the possible."""
+    """Doubt the unit of an angle or a length outside the rig's limits, else the usual range."""
     angle = channel_of(name) == "joint_angle"
     given = limits_of(rig, name)
     low, high = given or ((-2.0 * np.pi, 2.0 * np.pi) if angle else (1e-3, 10.0))
@@ -429,9 +427,7 @@ def assumed_unit(name: str, values: Array, rig: Rig | None, stated: str) -> tupl
 def _pressure_unit(
     channel: str, top: float, rig: Rig | None, stated: str, numbers: str
 ) -> tuple[str, str]:
-    """The unit in which the largest value is what the supply has or less; a muscle may hardly have
-    been filled, which is thought of in bar alone.
-    """
+    """Unit of pressure with which the maximum fits the supply, and words on the choice."""
     supplies = rig.tables("supply").values() if rig else ()
     reference = max([0.0, *(float(table["initial_pressure"]) for table in supplies)]) or 8e5
     least, most = (0.6, 1.5) if channel == "supply_pressure" else (0.03, 1.1)
@@ -453,7 +449,7 @@ def _pressure_unit(
 
 
 def subtracted(recorded: Array | None, stated: float | None, unit: str) -> tuple[float, str]:
-    """What makes gauge pressures of absolute ones.
+    """Ambient pressure to subtract from absolute pressures to make them gauge.
 
     Parameters
     ----------

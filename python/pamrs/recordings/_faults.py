@@ -27,8 +27,8 @@ _REST: Final = 12.0  # quanta that a channel at rest may span
 
 
 class Fault(NamedTuple):
-    """A faulty stretch, ``rows[start:stop]`` of the channel as it was read; of one that is
-    saturated by running into it, the end of its sensor's range.
+    """Faulty stretch, ``rows[start:stop]`` of the channel as it was read; `rail` is the end of the
+    sensor's range that it ran into.
     """
 
     kind: str
@@ -92,9 +92,7 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
 
 
 def _rails(data: Array, good: Index) -> list[Fault]:
-    """Dropouts: runs at one end of the range, entered and left by leaps that the channel makes
-    nowhere else, after which it goes on where it was.
-    """
+    """Dropouts: runs at one end of the range, entered and left by leaps found nowhere else."""
     found: list[Fault] = []
     if len(data) < 3 * _LEAST:
         return found
@@ -123,7 +121,7 @@ def _fault(kind: str, good: Index, start: int, stop: int, text: str) -> Fault:
 
 
 def _dropped(data: Array, start: int, stop: int, usual: float) -> bool:
-    """Whether a run is a dropout: leaps at both ends, about the same value on either side."""
+    """True where a run is a dropout: leaps at both ends, about the same value on either side."""
     sides = [float(data[i]) for i in (start - 1, stop) if 0 <= i < len(data)]
     leaps = [abs(side - float(data[start])) for side in sides]
     same = len(sides) == 1 or abs(sides[0] - sides[1]) <= _RAIL_SAME * min(leaps)
@@ -152,9 +150,7 @@ def _outliers(data: Array, good: Index) -> list[Fault]:
 
 
 def _quantum(data: Array) -> float:
-    """The smallest step between values, near enough: a low quantile of the steps that are not
-    rounding.
-    """
+    """Smallest step between values: a low quantile of those above rounding."""
     steps = np.diff(np.unique(data))
     span = float(data.max() - data.min())
     steps = steps[steps > 1e-9 * max(span, abs(float(data[0])) * 1e-3)]
@@ -162,7 +158,7 @@ def _quantum(data: Array) -> float:
 
 
 class _Stretches:
-    """Runs of exactly equal values of one channel, and what its noise makes of rest."""
+    """Runs of exactly equal values of one channel, judged by its noise."""
 
     def __init__(self, channel: str, data: Array) -> None:
         self.channel = channel
@@ -178,9 +174,7 @@ class _Stretches:
         self.rest_windows, self.limit = self._noise()
 
     def _noise(self) -> tuple[int, float]:
-        """Number of windows in which the channel rests but its noise lives, and the longest run
-        allowed.
-        """
+        """Count of windows that rest with live noise, and the longest run of equal samples."""
         count = len(self.data) // _WINDOW
         if count < 3:
             return 0, math.inf
@@ -227,15 +221,13 @@ class _Stretches:
         return sorted(found, key=lambda item: item[1])
 
     def _ordinary_extreme(self, value: float) -> bool:
-        """A joint against its stop; a vented pressure or an unloaded cell at zero."""
+        """True for extremes that are no fault: a joint at its stop, a pressure or force at zero."""
         if CHANNELS[self.channel].has("rests"):
             return True
         return value == self.low and abs(value) <= 0.02 * (self.high - self.low)
 
     def _believable(self, start: int, stop: int) -> bool:
-        """Whether an overlong run is the sensor's doing and not that of a joint held by
-        friction.
-        """
+        """True where an overlong run is a sensor fault, not a joint held by friction."""
         if not CHANNELS[self.channel].has("rests"):
             return True
         lively = self.rest_windows * _WINDOW >= 3 * (stop - start)
@@ -246,14 +238,14 @@ class _Stretches:
         return abs(float(self.step[stop - 1])) if stop < len(self.data) else 0.0
 
     def _leaps(self, start: int, stop: int) -> bool:
-        """Whether it comes back with a step far beyond every other step of the channel."""
+        """True where a run ends with a step above 5 times every other step of the channel."""
         size = np.abs(self.step)
         before = float(size[: max(start - 1, 0)].max(initial=0.0))
         after = float(size[stop:].max(initial=0.0))
         return self._jump(start, stop) > 5.0 * max(before, after, self.quantum)
 
     def _cut_off(self, start: int, stop: int) -> bool:
-        """Whether the signal runs into the extreme, or leaves it, at full slope."""
+        """True where the signal enters or leaves the extreme faster than it usually steps."""
         slopes = []
         if start >= 6:
             slopes.append(abs(float(self.data[start] - self.data[start - 6])) / 6)

@@ -1,4 +1,4 @@
-"""What files say of their own size, asked before anything of them is read or unpacked."""
+"""Limits on the size that a file claims for itself, checked before it is read or unpacked."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Gate:
         self._rows = self._cells = self._columns = 0
 
     def admit(self, rows: int, columns: int = 1, size: int = 0) -> None:
-        """Ask for a part of the file.
+        """Count a part of the file towards its limits.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ class Gate:
         check_size(self._rows, self._cells, str(self._path), self._columns)
 
     def admit_array(self, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
-        """Ask for an array; samples run along its longest axis."""
+        """Count an array towards the limits; samples run along its longest axis."""
         count = math.prod(int(n) for n in shape)
         rows = max((int(n) for n in shape), default=1)
         self.admit(rows, count // rows if rows else 0, count * dtype.itemsize)
@@ -118,7 +118,7 @@ def admit_numpy(path: Path) -> None:
 
 
 def _admit_heading(gate: Gate, stream: Any) -> int:
-    """Ask for the array whose heading comes next; its bytes."""
+    """Count the array whose NumPy heading comes next towards the limits; its size in bytes."""
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0
     if version != (1, 0):
@@ -269,7 +269,7 @@ class Unpacking:
 
 
 def _unpacked(data: bytes) -> Any:
-    """What reads packed bytes, known by their first ones; None where they are not packed."""
+    """Unpacking stream of zstd, lz4 or bzip2 bytes, known by their first ones; None for others."""
     if data.startswith(b"\x28\xb5\x2f\xfd"):
         import zstandard
 

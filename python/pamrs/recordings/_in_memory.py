@@ -35,7 +35,7 @@ class Arrays(NamedTuple):
 
 
 def is_table(thing: Any) -> bool:
-    """Whether something has channels by name: a dict, DataFrame or Dataset."""
+    """True where something has channels by name: a dict, DataFrame or Dataset."""
     return isinstance(thing, Mapping) or hasattr(thing, "columns")
 
 
@@ -83,9 +83,7 @@ def arrays_of(
 
 
 def _table(problems: list[str], name: Any, table: Any, given: Mapping[str, str]) -> Arrays:
-    """The channels of one recording, some with units that are given apart; what is wrong is added
-    to `problems`.
-    """
+    """Read the channels of one recording, with units given apart; adds to `problems`."""
     if not isinstance(name, str):
         problems.append(f"recording {name!r}: a name is needed that is a text")
     found = Arrays({}, {})
@@ -176,7 +174,7 @@ def _array(problems: list[str], label: str, values: Any, *, dates: bool) -> Arra
 
 
 def _is_number(value: Any) -> bool:
-    """Whether something is a number, or nothing where one was not measured."""
+    """True where a value converts to a float, or is None because it was not measured."""
     try:
         return value is None or float(value) is not None
     except (TypeError, ValueError):
@@ -186,7 +184,7 @@ def _is_number(value: Any) -> bool:
 def _names(
     tables: Mapping[str, Arrays], held_out: Sequence[str], units: Mapping[str, str]
 ) -> list[str]:
-    """Names in `held_out` and `units` that are those of nothing."""
+    """Problems of `held_out` and `units`: recordings or channels in them that do not exist."""
     known = ", ".join(map(repr, tables))
     channels = {key for table in tables.values() for key in table.values}
     problems = [f"units[{k!r}]: no recording has that channel" for k in units if k not in channels]

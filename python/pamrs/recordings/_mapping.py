@@ -40,7 +40,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a channel comes from, and what its numbers stand for in `unit`.
+    """Series of a log that gives a channel, with the calibration from its numbers to `unit`.
 
     Attributes
     ----------

@@ -127,7 +127,7 @@ def words_of(name: str) -> list[str]:
 
 
 def _joined(word: str) -> tuple[str, ...]:
-    """The two known words that make one, with the s that German puts between them or not."""
+    """Two known words that form one, perhaps joined by a German s; empty where there are none."""
     for end in range(1, min(len(word), 30)):
         first, second = word[:end], word[end:]
         roles = _COMMANDED | _MEASURED
@@ -235,7 +235,7 @@ def matched(
 
 
 def _stated_pressure(series: Sequence[Series]) -> str:
-    """The unit that the log says of a pressure, the first one; empty where it says none."""
+    """Unit of the first pressure whose unit the log states; empty where there is none."""
     for each in series:
         written = understood_unit(each.unit)
         if written is not None and same_dimension(written.unit, "Pa"):
@@ -293,7 +293,7 @@ def _measures(written: Written, channel: str) -> bool:
 
 
 def _made_gauge(matches: list[Match], rig: Rig | None) -> tuple[list[Match], list[str]]:
-    """Absolute pressures with what is subtracted from them, and words that say so."""
+    """Matches with the ambient pressure to subtract from absolute ones, and remarks on that."""
     recorded = next((each.si() for each in matches if each.channel == "ambient_pressure"), None)
     stated = None if rig is None else ambient_of(rig)
     found, told = list(matches), []
@@ -316,7 +316,7 @@ def _role(series: Series) -> str:
 
 
 def _score(series: Series, name: str, several: bool) -> float:
-    """How well name and unit fit; 0 where they do not."""
+    """Score of a series as a channel by name, unit and range; 0 where it cannot be that channel."""
     good = series.values[np.isfinite(series.values)]
     if series.labels or good.size < 2:
         return 0.0
@@ -343,14 +343,14 @@ def _score(series: Series, name: str, several: bool) -> float:
 
 
 def _like_weather(values: np.ndarray[Any, np.dtype[np.float64]], written: Written) -> bool:
-    """Whether pressures are those of air outdoors, and not measured from them."""
+    """True where the median is an atmospheric pressure, absolute."""
     row = CHANNELS["ambient_pressure"]
     pressure = float(np.median(values)) * parse_unit(written.unit).scale
     return row.lower < pressure < row.upper
 
 
 def _called(series: Series, channel: str, words: set[str]) -> float:
-    """How well the name of a series fits a channel; 0 where it does not."""
+    """Score of the name of a series for a channel; 0 where the name excludes the channel."""
     if NOT_A_CHANNEL & words:
         return 0.0
     strong, weak = CHANNELS[channel].strong, CHANNELS[channel].weak
@@ -388,7 +388,7 @@ def _called(series: Series, channel: str, words: set[str]) -> float:
 def _lonely(
     candidates: Sequence[Series], wanted: Sequence[str], taken: dict[int, int]
 ) -> list[tuple[int, int]]:
-    """The only series of a dimension, for the only channel of that dimension that is left."""
+    """Pairs of the only series and the only channel left of a dimension."""
     found = []
     for column, name in enumerate(wanted):
         channel = channel_of(name)
@@ -414,7 +414,7 @@ def _lonely(
 
 
 def _named_otherwise(series: Series, channel: str) -> bool:
-    """Whether a series has the name of another channel, or the other role."""
+    """True where a series has the name of another channel, or the opposite role."""
     words, role = set(words_of(series.name)), _role(series)
     if role and (role in _COMMANDED) != (channel in _COMMANDS):
         return True

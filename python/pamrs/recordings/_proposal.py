@@ -1,4 +1,4 @@
-"""What a log has, which of it is likely which channel, and the ``case.toml`` that says so."""
+"""Proposes for the series of a log which channel each one is, and writes the ``case.toml``."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _MOST_UNUSED: Final = 6  # series that are no channel and are named
 
 @dataclass(frozen=True)
 class Listed:
-    """One series of a log, as it is shown.
+    """Row of the list of series that is shown to the user.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Listed:
 
 @dataclass(frozen=True, eq=False)
 class LogProposal:
-    """What is proposed for one log.
+    """Proposal for one log: its channels, their clock, and the split into recordings.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class LogProposal:
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """What is proposed for some logs of one rig.
+    """Proposal for some logs of one rig.
 
     Attributes
     ----------
@@ -181,9 +181,7 @@ class Proposal:
 
     @property
     def held_out(self) -> LogProposal | None:
-        """The log that is held out, of three parts or more the last one alone; None where there is
-        nothing to hold out.
-        """
+        """Log that is held out, of several parts the last alone; None where none can be."""
         usable = self._usable
         several = len(usable) > 1 or any(len(item.pieces) > 2 for item in usable)
         return usable[-1] if several else None
@@ -284,9 +282,7 @@ def propose(
 def _proposals(
     log: Log, wanted: Sequence[str], rig: Rig | None, sample_time: float | None
 ) -> list[LogProposal]:
-    """What is proposed for a log: for each of its tables, where the same channels are in several;
-    else one recording of all.
-    """
+    """Proposals for a log: one for each table where several share channels, else one for all."""
     whole = _proposal(log, wanted, rig, sample_time)
     each = [_proposal(log.only(table), wanted, rig, sample_time) for table in log.tables]
     channels = [match.channel for item in each for match in item.matches]
@@ -371,7 +367,7 @@ def _proposal(
 
 
 def _unused(names: list[str]) -> list[str]:
-    """What to say of series that are no channel, in at most one line."""
+    """Remark on series that are no channel, at most one."""
     if not names:
         return []
     more = f" and {len(names) - _MOST_UNUSED} more" if len(names) > _MOST_UNUSED else ""
@@ -380,7 +376,7 @@ def _unused(names: list[str]) -> list[str]:
 
 
 def _spoken(channel: str, rig: Rig) -> str:
-    """A channel, what it measures, and whether a case can do without it."""
+    """Channel as words: its name, its sensor, and a note where a case can do without it."""
     kind = CHANNELS[channel_of(channel)]
     frames = [t for t in rig.tables("load").values() if t.get("kind", "mass") == "frame"]
     extra = kind.has("extra") and not (kind.name == "force" and frames)
@@ -388,7 +384,7 @@ def _spoken(channel: str, rig: Rig) -> str:
 
 
 def _like_a_clock(series: Series) -> bool:
-    """Whether a series is called like a time, or is one, and rises."""
+    """True where a series has the name of a clock or holds time stamps, and rises."""
     words = words_of(series.name)
     called = bool(words) and (words[-1] in CLOCK_WORDS or words[0] in CLOCK_WORDS)
     called |= series.stamps or words == ["x", "value"]  # LabVIEW calls its time X_Value
@@ -403,7 +399,7 @@ def _like_a_clock(series: Series) -> bool:
 
 
 class _Clocks:
-    """Which series of a log are the times of the others, and what was done to them."""
+    """Clocks of a log: the series that hold the times of others, and remarks on them."""
 
     def __init__(self, log: Log, sample_time: float | None) -> None:
         self._step = sample_time
@@ -468,7 +464,7 @@ class _Clocks:
 
 
 def _held(times: dict[str, Array]) -> set[str]:
-    """Channels with few samples at uneven times beside the others."""
+    """Channels logged on change: less than a fifth of the most samples, at uneven times."""
     most = max((len(time) for time in times.values()), default=0)
 
     def uneven(time: Array) -> bool:
@@ -480,7 +476,7 @@ def _held(times: dict[str, Array]) -> set[str]:
 
 
 def _rates(times: dict[str, Array]) -> list[str]:
-    """What becomes of channels that were sampled at different rates."""
+    """Remark on the common grid of channels with different rates; empty for one rate."""
     told = {k: _rate(time, len(time)) for k, time in times.items() if channel_of(k) not in UNTOLD}
     rates = {name: rate for name, rate in told.items() if rate > 0.0}
     if not rates or max(rates.values()) < 1.01 * min(rates.values()):
@@ -517,9 +513,7 @@ def _listed(series: Series, clock: Ticks | None, matches: Sequence[Match]) -> Li
 
 
 def _split(log: Log, clock: Ticks | None) -> tuple[str | dict[str, Any] | None, list[int], int]:
-    """Where one recording ends and the next begins, the numbers of the parts that are long enough,
-    and how many are not.
-    """
+    """Key ``split`` of a log, the numbers of its long parts, and the count of its short ones."""
     if clock is None or len(clock.rows) < 2 * _SHORTEST:
         return None, [], 0
     time = clock.spread[0]
@@ -548,9 +542,7 @@ def _split(log: Log, clock: Ticks | None) -> tuple[str | dict[str, Any] | None, 
 
 
 def _numbers(cut: Cut, time: Array, column: Split | None) -> tuple[list[int], int] | None:
-    """Numbers of the parts that are long enough, and how many are not; None where there are too
-    many parts, or only one.
-    """
+    """Numbers of the long parts and the count of the others; None for one part or too many."""
     found = stretches_of(cut, time, column)
     long = [part.number for part in found if part.stop - part.start >= _SHORTEST]
     if len(found) < 2 or not long or len(long) > _MOST_PARTS:

@@ -88,7 +88,7 @@ class OwnValue:
 
     @property
     def slope(self) -> float:
-        """How much it changes in this recording with its value elsewhere."""
+        """Derivative of the value in this recording with respect to the value elsewhere."""
         if self.error in ("none", "own"):
             return 0.0
         return self.value / self.nominal if self.error == "proportional" else 1.0
@@ -181,7 +181,7 @@ class Recording(View, Tabular):
         return float(self.time[-1])
 
     def rig_there(self, rig: Rig) -> Rig:
-        """A rig as it was in this recording: with the values that it had there.
+        """Copy of a rig with the parameter values that hold in this recording alone.
 
         Parameters
         ----------
@@ -219,7 +219,8 @@ class Recording(View, Tabular):
         return rig.with_parameters(values) if values else rig
 
     def valid(self, *channels: str) -> Mask:
-        """Where all these channels may be used; without names, where all that there are may be.
+        """Samples at which all these channels may be used; without names, all channels that there
+        are.
 
         Parameters
         ----------
@@ -364,9 +365,7 @@ def assemble(
 
 
 class Laid(NamedTuple):
-    """Values of a channel in SI, (r,), those of the rows that its grid uses, and that grid; held
-    ones were logged on change.
-    """
+    """Values of a channel in SI, (r,), of the rows that its grid uses; `held`: logged on change."""
 
     values: Array
     grid: Grid

@@ -59,7 +59,7 @@ class Sampled:
     remarks: tuple[str, ...] = ()
 
     def rows(self, start: int, stop: int) -> Sampled:
-        """The same, between two of its samples."""
+        """Copy of the channel with its samples ``start`` to ``stop`` (exclusive) alone."""
         places = None if self.places is None else self.places[start:stop]
         return replace(
             self, values=self.values[start:stop], time=self.time[start:stop], places=places
@@ -149,8 +149,8 @@ def recording_of(
 
 
 class _Averaged(Grid):
-    """A grid that is coarser than the samples: means with weights that fall to zero one step of
-    the grid away, which delay nothing and keep a straight line as it is.
+    """Grid coarser than the samples: means with weights that fall to zero one step of the grid
+    away, which delay nothing and keep a straight line as it is.
     """
 
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
@@ -179,7 +179,7 @@ class _Held(Grid):
     interpolates = False
 
     def _place_samples(self) -> None:
-        """Nothing: no sample lies between two."""
+        """Do nothing: events are not interpolated."""
 
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
         """The last value at or before each time; NaN, and False in the mask, before the first."""
@@ -191,8 +191,8 @@ class _Held(Grid):
 
 
 class _Commanded(_Held):
-    """Commands, which hold from one sample to the next: their mean over each step of the grid that
-    follows, so that what they did in all stays the same.
+    """Grid of commands, which hold between samples: their mean over the step of the grid that
+    follows, which keeps their integral.
     """
 
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
@@ -295,7 +295,7 @@ def _rising(channel: Sampled, source: str) -> Index:
 
 
 def _common(channels: Sequence[Sampled], step: float, source: str) -> tuple[float, Array]:
-    """When all channels have begun, and the grid from there to where the first one ends."""
+    """Start time and grid of the stretch in which all channels were sampled."""
     start = max(float(channel.time[0]) for channel in channels)
     stop = min(float(channel.time[-1]) for channel in channels)
     check_samples(max(stop - start, 0.0), step, source)
@@ -320,7 +320,7 @@ def _common(channels: Sequence[Sampled], step: float, source: str) -> tuple[floa
 
 
 def _missing(name: str, stamps: Array, interval: float, time: Array, step: float) -> list[Issue]:
-    """Gaps of a channel, and what of it lies outside the recording."""
+    """Issues of a channel: its gaps, and its samples outside the recording."""
     elapsed = np.diff(stamps)
     events = gaps(stamps, elapsed, np.zeros(len(elapsed), dtype=bool), interval)
     last = float(time[-1])

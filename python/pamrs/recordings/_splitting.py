@@ -21,7 +21,7 @@ _MOST: Final = 10_000
 
 @dataclass(frozen=True)
 class Cut:
-    """How a log is parted: at pauses longer than `gap` [s], by a column, else by its clock."""
+    """Rule that parts a log: at pauses longer than `gap` [s], by a column, else by its clock."""
 
     gap: float | None = None
     column: str | None = None
@@ -36,9 +36,7 @@ class Split(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """Rows ``start`` to ``stop`` (exclusive) of a clock, counted from 1, and what they are called;
-    without a label they are no part.
-    """
+    """Rows ``start`` to ``stop`` (exclusive) with number, from 1, and label, empty for no part."""
 
     number: int
     label: str
@@ -148,7 +146,7 @@ def parts(
 
 
 def stretches_of(cut: Cut, time: Array, column: Split | None) -> list[Stretch]:
-    """Where a clock is parted.
+    """Stretches into which a clock is parted by a rule.
 
     Parameters
     ----------
@@ -183,9 +181,7 @@ def _clock_of(item: Sampled) -> Ticks:
 
 
 def _labels(column: Split, starts: Sequence[int]) -> list[str]:
-    """What the column says in each part; what it says again gets a number. Parts without a value
-    have no label and are left out.
-    """
+    """Text of the column in each part, numbered where it repeats; empty without a value."""
     seen: dict[str, int] = {}
     labels: list[str] = []
     for start in starts:
@@ -212,7 +208,7 @@ def _cut(channels: Sequence[Sampled], clock: Ticks, stretches: Sequence[Stretch]
 
 
 def _inside(item: Sampled, clock: Ticks, start: int, stop: int, low: float, high: float) -> Sampled:
-    """What of a channel lies in a part; of one that holds, with the value from before."""
+    """Samples of a channel in a part; a held channel also has the value from before the part."""
     own = item.clock
     if own is clock or (own is not None and np.array_equal(own.time, clock.time)):
         if item.places is None:

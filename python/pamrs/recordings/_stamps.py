@@ -197,9 +197,7 @@ def _counted_on(stamps: Array) -> tuple[Array, list[str]]:
 
 
 def _in_order(time: Array) -> tuple[Rows, int]:
-    """Order of the rows in which a few that came late stand in their places; where the clock
-    starts again, it stays so.
-    """
+    """Order of the rows with late ones in their places, and their number; restarts are kept."""
     order: Rows = np.arange(len(time))
     laid = time.copy()
     start, done, moved = 0, 0, 0
@@ -226,8 +224,8 @@ def _in_order(time: Array) -> tuple[Rows, int]:
 
 
 def _came_late(written: Array, first: int, stop: int) -> bool:
-    """Whether rows up to `stop` fill what those from `first` on left open: the steps of one clock
-    are more even in order, those of a clock that started again as they were written.
+    """True where rows up to `stop` belong before those from `first` on, as sorting makes their
+    steps more even, which it does not for a clock that started again.
     """
     merged = written.copy()
     merged[first:stop].sort()
@@ -280,9 +278,7 @@ def spread(time: Array) -> tuple[Array, str]:
 
 
 def _evenly(time: Array, laid: Array, firsts: Rows) -> Array:
-    """Times of a clock that is coarser than the samples: even from pause to pause, where no row is
-    further from its stamp than the next one.
-    """
+    """Times on a straight line from pause to pause, where it fits coarse stamps within a step."""
     lasting = np.diff(time[firsts])
     usual = float(np.median(lasting[lasting > 0.0]))
     pauses = np.flatnonzero((lasting < 0.0) | (lasting > GAP * usual)) + 1

@@ -19,7 +19,7 @@ KEYS: Final = ("scale", "offset", "from", "to")
 
 
 class Calibration(NamedTuple):
-    """What numbers of a log stand for.
+    """Line or table from the numbers of a log to values.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Calibration(NamedTuple):
     table: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
     def of(self, raw: Array | float) -> Array:
-        """Values of numbers of the log."""
+        """Convert numbers of the log to values."""
         numbers = np.asarray(raw, dtype=np.float64)
         if self.table is None:
             return np.asarray(self.scale * numbers + self.offset)

@@ -21,7 +21,7 @@ _GIVE: Final = "in the .toml description or to load_force_map"
 
 
 class Dialect(NamedTuple):
-    """What separates cells, and what marks decimals."""
+    """Separator of the cells of a text table, and its decimal mark."""
 
     delimiter: str
     decimal: str
@@ -47,7 +47,7 @@ def check_marks(delimiter: str | None, decimal: str | None, source: str) -> None
 
 
 def is_number(cell: str, decimal: str, thousands: str | None) -> bool:
-    """Whether a cell is a number in a dialect."""
+    """True where a cell is a number in a dialect."""
     cell = cell.replace(thousands, "") if thousands else cell
     if decimal == "," and "." in cell:
         return BESIDE_COMMAS.fullmatch(cell) is not None
@@ -59,7 +59,7 @@ def is_number(cell: str, decimal: str, thousands: str | None) -> bool:
 
 
 def is_useful(cell: str, decimal: str, thousands: str | None) -> bool:
-    """Whether a cell is a number, a date or a time of day."""
+    """True where a cell is a number, a date or a time of day."""
     return is_number(cell, decimal, thousands) or is_moment(cell)
 
 

@@ -78,7 +78,7 @@ class Lines(NamedTuple):
         return line.split() if self.delimiter == " " else line.split(self.delimiter)
 
     def widths(self) -> list[int]:
-        """How many cells each row has."""
+        """Number of cells of each row."""
         if self.delimiter == " ":
             return [len(line.split()) for line in self.lines]
         return [line.count(self.delimiter) + 1 for line in self.lines]
@@ -172,7 +172,7 @@ class Table:
         return _numbers_of_cells(cells, thousands, decimal)
 
     def doubtful(self, index: int, decimal: str) -> bool:
-        """Whether only all cells of a column together tell how its numbers are written."""
+        """True where only all cells of a column together show the format of its numbers."""
         matrix = self._matrices.get(decimal)
         return matrix is not None and index in matrix.whole
 
@@ -230,9 +230,7 @@ class Table:
 
 
 class _Matrix(NamedTuple):
-    """Numbers of all columns, the rows of each whose cells are none, and the columns that only all
-    their cells together tell how to read.
-    """
+    """Numbers of all columns, rows of each that are no numbers, and columns read as a whole."""
 
     values: Array
     strange: list[list[int]]
@@ -266,9 +264,7 @@ def _matrix(body: Lines, decimal: str, width: int) -> _Matrix:
 def _parsed(
     lines: list[str], delimiter: str, decimal: str, columns: list[int] | None
 ) -> Array | None:
-    """Rows of nothing but numbers, as NumPy reads them; None where a cell is none, or may be read
-    in two ways.
-    """
+    """Rows of nothing but numbers, parsed by NumPy; None where a cell is no number or ambiguous."""
     text = "\n".join(lines)
     if "_" in text:  # no digits of a number, whatever Python says
         return None
@@ -308,7 +304,7 @@ def _numbers_of_cells(
 
 
 def told_cells(cells: Sequence[str]) -> str:
-    """What is said of cells that are no numbers: ``3 cells are no numbers ('OL', '#N/A')``."""
+    """Remark on cells that are no numbers: ``3 cells are no numbers ('OL', '#N/A')``."""
     words = list(dict.fromkeys(cell.strip()[:20] for cell in cells))
     some = ", ".join(map(repr, words[:4])) + (" and so on" if len(words) > 4 else "")
     count = "1 cell is no number" if len(cells) == 1 else f"{len(cells)} cells are no numbers"
@@ -316,7 +312,7 @@ def told_cells(cells: Sequence[str]) -> str:
 
 
 def told_rows(numbers: Sequence[int], what: str) -> list[str]:
-    """What is said of rows that are left out: none where there is none."""
+    """Remark on rows that are left out, in a list; empty where there are none."""
     if not numbers:
         return []
     return [f"{what}: {len(numbers)} (first: row {numbers[0]}), left out"]
@@ -331,13 +327,13 @@ def _number_hint(text: str, thousands: str | None, decimal: str) -> str:
 
 
 def is_text(path: Path) -> bool:
-    """Whether a file is read as text, by its ending; the others are logs of their own kinds."""
+    """True where a file is read as text, by its ending; the others are logs of their own kinds."""
     ending = path.with_suffix("").suffix if path.suffix.lower() == ".gz" else path.suffix
     return ending.lower() in TEXT
 
 
 def stem_of(path: Path) -> str:
-    """Name of a file without its last ending, and without that it is packed."""
+    """Name of a file without its last ending and without ``.gz``."""
     return path.name.removesuffix(".gz").rpartition(".")[0] or path.name.removesuffix(".gz")
 
 
@@ -461,7 +457,7 @@ def split_rows(text: str, delimiter: str) -> list[list[str]]:
 
 
 def usual_width(widths: Sequence[int]) -> int:
-    """How many cells most rows have; 0 where there are no rows."""
+    """Number of cells that most rows have; 0 where there are no rows."""
     return max(set(widths), key=widths.count) if widths else 0
 
 
@@ -579,7 +575,7 @@ def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
 
 
 def renamed(table: Table, columns: Any, source: str) -> list[Any]:
-    """What is said of each column: the file's own headings, or what stands in their place.
+    """Headings of the columns: the file's own, or those that the caller gives for them.
 
     Parameters
     ----------
@@ -621,7 +617,7 @@ def renamed(table: Table, columns: Any, source: str) -> list[Any]:
 
 
 def has(name: str, header: Sequence[str]) -> str:
-    """What the file has in place of a heading, and the one that is nearly it."""
+    """Headings that a file has, as words, with the nearest one to a heading that it lacks."""
     plain = name.strip().lower()
     near = [heading for heading in header if plain and heading.lower().startswith(plain)]
     near = near or difflib.get_close_matches(name, header, n=1, cutoff=0.6)

@@ -86,7 +86,7 @@ def _elsewhere(item: Any) -> str:
 
 
 def leads_elsewhere(group: Any) -> Iterator[tuple[str, str]]:
-    """What in a group, or below it, leads to other files, or is a view that may.
+    """Find the links and data sets of a group, or below it, that lead to other files or may do so.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What every reader makes of a file: named series of numbers, each perhaps with a clock."""
+"""Log as every reader returns it: named series of numbers, each perhaps with a clock."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Series:
 
 @dataclass(frozen=True)
 class TextFormat:
-    """How a text file is written, where it is not to be found out.
+    """Format of a text file as far as the user states it; the rest is found out.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Log:
     tables: tuple[str, ...] = ()
 
     def only(self, table: str) -> Log:
-        """The same with one of its tables alone."""
+        """Copy of the log with one of its tables alone."""
         some = {name: each for name, each in self.series.items() if name.startswith(table)}
         said = [text for text in self.remarks if text.startswith(table)]
         lost = {name: why for name, why in self.unread.items() if name.startswith(table)}
@@ -239,7 +239,7 @@ _BEYOND: Final = {word: parse_unit(unit).scale for word, unit in TIME_UNITS.item
 
 
 def _parted(name: str) -> tuple[str, str]:
-    """What stands before the last word of a name, and that word."""
+    """Part of a name before its last word, and that word in small letters."""
     match = re.fullmatch(r"(.*?)([A-Za-z]+)", name)
     return (match[1], match[2].lower()) if match else (name, "")
 
@@ -271,7 +271,7 @@ def _join(log: Log, name: str) -> None:
 
 
 def _parts_of_a_second(whole: Array, beyond: Array, scale: float) -> bool:
-    """Whether whole numbers go on by what begins again below one."""
+    """True where `beyond` holds the fractions of a clock whose whole seconds are `whole`."""
     good = np.isfinite(whole) & np.isfinite(beyond)
     rest = beyond[good] * scale
     if not good.any() or np.any(np.diff(whole[good]) < 0.0) or np.ptp(rest) == 0.0:

@@ -215,7 +215,7 @@ def _fields(value: Any) -> _Fields | None:
 
 
 class _Fields(dict[str, Any]):
-    """Looked up without regard to capitals and a last ``_``; `kind` is the class of an object."""
+    """Dict looked up regardless of capitals and a last ``_``; `kind` is the class of an object."""
 
     kind: str = ""
 

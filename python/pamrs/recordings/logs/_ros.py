@@ -175,7 +175,7 @@ def _mcap_messages(stream: Any, unpacked: Unpacking, unread: dict[str, str]) -> 
 
 
 def _decoders(encoding: str) -> Any:
-    """What decodes messages of an encoding; None where nothing does."""
+    """Decoder factory of an encoding of MCAP messages; None for an encoding that has none."""
     if encoding == "cdr":
         from mcap_ros2.decoder import DecoderFactory as Ros
 

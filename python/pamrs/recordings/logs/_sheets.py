@@ -128,9 +128,7 @@ def _check_records(path: Path, data: bytes) -> None:
 
 
 def _streams(data: bytes) -> list[bytes]:
-    """Streams of a compound file that are called like a workbook; the bytes themselves if it is
-    none.
-    """
+    """Streams of a compound file that are named like a workbook; else the bytes themselves."""
     if data[:8] != bytes.fromhex("d0cf11e0a1b11ae1") or len(data) < 512:
         return [data]
     shift = struct.unpack_from("<H", data, 30)[0]

@@ -40,7 +40,7 @@ _THOUSANDS = re.compile(r"[-+]?(\d{1,3}(\.\d{3})+|0)")
 
 
 class _Headed(NamedTuple):
-    """Where the numbers of a table begin, and what stands above them."""
+    """First row and width of a table, with the names and units from the rows above it."""
 
     first: int
     width: int
@@ -158,7 +158,7 @@ def _headed(
     form: TextFormat,
     comment: list[str] | None,
 ) -> _Headed:
-    """What stands above the numbers of a table."""
+    """Read names and units of the columns from the rows above the numbers of a table."""
     first, width = _first_row(head, middle, decimal, form)
     if comment is not None and not (len(comment) == width and width > 1):
         comment = None
@@ -196,9 +196,7 @@ def _first_row(
 
 
 def _begun_before(rows: list[list[str]], width: int, useful: Callable[[list[str]], int]) -> int:
-    """How many rows come before headings that a logger wrote after what was left of its last run,
-    with those headings; 0 where there are none.
-    """
+    """Rows up to and with headings below a logger's last run; 0 where there are none."""
     last = 0
     for place, row in enumerate(rows):
         if len(row) == width > 1 and all(row) and useful(row) == 0 and len(set(row)) == width:
@@ -222,9 +220,7 @@ def _last_comment(lines: list[str], dialect: Dialect) -> list[str] | None:
 def _headings(
     above: list[list[str]], width: int, form: TextFormat, comment: list[str] | None
 ) -> tuple[list[str], list[str], list[list[str]]]:
-    """Names and units out of the rows above the numbers: headings, and perhaps a row of units; and
-    those rows.
-    """
+    """Names and units from the rows above the numbers, and those rows."""
     full = [row for row in above if len(row) in (width, width + 1) or 2 * len(row) > width > 2]
     if form.header is False or not (full or comment):
         return [f"{_UNNAMED}{i + 1}" for i in range(width)], [""] * width, []
@@ -241,7 +237,7 @@ def _headings(
 
 
 def _all_units(cells: list[str]) -> bool:
-    """Whether a row is one of units: more than half of what it says are some that are known."""
+    """True where more than half of the cells of a row that have a text are known units."""
     said = [cell for cell in cells if cell not in ("", "-", "1", "%")]
     return 2 * sum(understood_unit(cell) is not None for cell in said) > len(said)
 
@@ -331,7 +327,7 @@ _MOST: Final = 0.8  # of the lines look so
 
 
 def arrows_apart(lines: Sequence[str]) -> tuple[list[str], list[str]] | None:
-    """What stands before and behind the arrow of ``10:16:51.123 -> 5.00,152057``.
+    """Split lines like ``10:16:51.123 -> 5.00,152057`` at the arrow.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ _PRESSURES: Final = (
 
 
 class Written(NamedTuple):
-    """What a log's unit means.
+    """Unit of a log in the terms of the package, with a calibration where the text gives one.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Written(NamedTuple):
 
 
 def understood_unit(text: str) -> Written | None:
-    """What a log's unit means.
+    """Translate a log's unit into one of the package.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def unwrapped(text: str) -> str:
 
 
 def _closed(text: str) -> bool:
-    """Whether every round bracket that is closed was opened before."""
+    """True where every round bracket that is closed was opened before."""
     ends = range(1, len(text) + 1)
     return all(text.count("(", 0, end) >= text.count(")", 0, end) for end in ends)
 
@@ -211,9 +211,7 @@ def split_heading(heading: str) -> tuple[str, str]:
 
 
 def _unit_among(heading: str) -> str:
-    """The unit that stands between other words, ``p1_psi_filt``; empty where there is none, or more
-    than one. What stands first is no unit, nor is a single letter.
-    """
+    """Only unit among other words, ``p1_psi_filt``, not the first word, no single letter."""
     for text in (heading.strip(), re.sub(r"(?<=[a-zäöü0-9])(?=[A-Z])", "_", heading.strip())):
         words = re.split(r"[_.\s-]+", text)[1:]
         units = {word for word in words if _like_a_tail(word) and word != "atm"}
@@ -223,7 +221,7 @@ def _unit_among(heading: str) -> str:
 
 
 def _like_a_unit(text: str) -> bool:
-    """Whether a text in round brackets is a unit, if one that is not known."""
+    """True where a text in round brackets has the form of a unit, known or not."""
     plain = text.strip().lower()
     return (
         plain in _COUNTS
@@ -234,5 +232,5 @@ def _like_a_unit(text: str) -> bool:
 
 
 def _like_a_tail(word: str) -> bool:
-    """Whether a word of more than one letter is a unit that names end with."""
+    """True where a word of more than one letter is a unit that names end with."""
     return len(word) > 1 and (word in _TAILS or word.upper() in _CAPITALS)
