@@ -157,9 +157,7 @@ class AdaptiveSliding(SlidingController):
 
 
 def held(error: Value, excess: Value) -> Value:
-    """0 where adapting by an error would carry a pressure farther beyond its limit, which it is by
-    ``excess``; else the error.
-    """
+    """Error by which to adapt, 0 where it would carry a pressure farther beyond its limit."""
     # every adaptation moves the pressure against the sign of s
     if error.__class__ is float and excess.__class__ is float:
         return 0.0 if error * excess < 0.0 else error

@@ -195,8 +195,8 @@ class AirModel:
         self._fraction, self._opening = _inverse(valve)
 
     def rate_per_volt(self) -> float:
-        """How fast a volt changes the pressure near the null [Pa/(s V)]: filling from the supply at
-        half its pressure, in the middle of the joint's range.
+        """Pressure rate per volt near the null [Pa/(s V)]: filling from the supply at half its
+        pressure, in the middle of the joint's range.
         """
         slow, middle = 1e4, 0.5 * (self.volume.low + self.volume.high)
         volts = self.command(slow, 0.5 * self.supply_pressure, self.supply_pressure, middle, 0.0)
@@ -329,9 +329,7 @@ def _group(rig: Rig, chamber: str | None) -> Group:
 
 
 def _inverse(valve: dict[str, Any]) -> tuple[list[float], list[float]]:
-    """Area fractions that rise strictly, and the opening of each: level stretches at the ends are
-    left out.
-    """
+    """Area fractions that rise strictly, with their openings; level ends are left out."""
     opening, fraction = [float(x) for x in valve["opening"]], [float(x) for x in valve["fraction"]]
     first, last = 0, len(fraction) - 1
     while first < last and fraction[first + 1] == fraction[0]:
@@ -385,7 +383,7 @@ class FlowInverse(Stateful):
 
 
 class SetPoint(Stateful):
-    """What a regulator is set to: the desired pressure, ahead of it by its rate times a time.
+    """Set pressure of a regulator: the desired pressure plus its rate times a lead time.
 
     Parameters
     ----------

@@ -1,5 +1,4 @@
-"""What a linear model leaves of a rig: effects without a derivative are refused, the others at
-rest.
+"""Rigs for linear models: effects without a derivative are refused, the others are held at rest.
 
 What each effect asks for stands in the catalogue (:class:`pamrs.effects.EffectInfo`).
 """
@@ -134,7 +133,7 @@ def without_dry_friction(rig: Rig) -> Rig:
 
 
 def after(simulator: Simulator, inputs: Mapping[str, float]) -> dict[str, float]:
-    """Channels one sample later; the simulator is left as it was.
+    """Channels one sample after the present state; the simulator is left as it was.
 
     Parameters
     ----------
@@ -171,9 +170,7 @@ def kept(rig: Rig, sample: Mapping[str, float]) -> dict[str, float]:
 
 
 def slowest(rig: Rig) -> dict[str, float]:
-    """Rate of every joint [rad/s] and load [m/s] by its channel, below which it rests if it has no
-    more after a short sample.
-    """
+    """Rates of joints [rad/s] and loads [m/s], by channel, up to which a body counts as at rest."""
     ends = {
         dotted("joint_rate", name): (table["min_angle"], table["max_angle"])
         for name, table in rig.tables("joint").items()

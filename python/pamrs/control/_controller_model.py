@@ -169,7 +169,7 @@ def _read(whole: Array, n: int, kept: list[int]) -> list[int]:
 
 
 def _resting(controller: Controller, point: Mapping[str, float], angle: Any) -> Reference:
-    """A reference that rests, at the joints' angles of a point or at others."""
+    """Reference at rest, at the joint angles of an operating point or at given ones."""
     tracked: tuple[str, ...] = getattr(controller, "tracked", ("joint_angle",))
     if angle is None:
         missing = [name for name in tracked if name not in point]
@@ -188,9 +188,7 @@ def _settled(
     reference: Reference,
     state: Mapping[str, Any] | None,
 ) -> Mapping[str, Any]:
-    """The controller's state at the operating point: the one given, or after three updates
-    there.
-    """
+    """State of the controller at the operating point: given, or that after three updates."""
     controller.reset()
     if state is None:
         for k in range(3):  # filters and differences have seen something
@@ -257,9 +255,7 @@ class _Update:
 def _slopes(
     update: _Update, inputs: tuple[str, ...], side: str
 ) -> tuple[list[tuple[Array, Array]], Array]:
-    """Slopes over every float of the state and every input, and what is answered at the point
-    itself.
-    """
+    """Slopes of states and commands over every state and input, and their values at the point."""
     start, point = update.start, update.point
     middle = update(start, point)
     slopes = []
@@ -277,9 +273,7 @@ def _slopes(
 def _refuse_corners(
     update: _Update, inputs: tuple[str, ...], steps: list[Array], kept: list[int]
 ) -> None:
-    """Name the first slope that differs between its sides, of the states that are kept or of the
-    command.
-    """
+    """Refuse a slope that differs between its sides, of the kept states or the commands."""
     n = len(update.paths)
     names = [".".join(map(str, path)) for path in update.paths]
     places = [*kept, *range(n, n + len(update.names))]
@@ -295,9 +289,7 @@ def _refuse_corners(
 
 
 def _slope(up: Array, middle: Array, down: Array, width: float, side: str) -> tuple[Array, Array]:
-    """Slope of what is answered, and by how much it differs between both sides; zero where that is
-    next to nothing.
-    """
+    """Central slope, and the difference of the slopes on both sides; zero where negligible."""
     above, below = (up - middle) / width, (middle - down) / width
     # the last digits of what is differenced are no corner
     slack = (

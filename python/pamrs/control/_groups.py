@@ -1,4 +1,4 @@
-"""What of a rig a controller acts on: its joints, the muscles that turn each, what feeds them."""
+"""Joints of a rig, the groups of muscles that turn each, and the valve or regulator of a group."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def check_single(rig: Rig, blocks: tuple[str, ...], needed: str) -> None:
 
 
 def beyond_sine(rig: Rig, joint: str) -> tuple[str, ...]:
-    """What makes the torque that holds a joint other than the sine of its angle times a number, as
-    ``key = value``.
+    """Parameters, as ``key = value``, with which the holding torque of a joint is not a constant
+    times the sine of its angle.
     """
     if rig.tables("load"):
         return ("load.kind = 'mass', whose weight is the same everywhere",)
@@ -38,7 +38,7 @@ def beyond_sine(rig: Rig, joint: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Feed:
-    """What sets the pressure of a chamber.
+    """Input that sets the pressure of a chamber.
 
     Attributes
     ----------
@@ -226,7 +226,7 @@ def highest_pressure(rig: Rig) -> float:
 
 
 def _short(block: str) -> str:
-    """``"joint.elbow"`` as ``"elbow"``, ``"joint"`` as ``""``."""
+    """Name of a block without its kind: ``"joint.elbow"`` as ``"elbow"``, ``"joint"`` as ``""``."""
     return block.partition(".")[2]
 
 
@@ -237,7 +237,7 @@ def _feed(
     lines: Mapping[str, Mapping[str, str]],
     supplies: Mapping[str, Mapping[str, Any]],
 ) -> Feed:
-    """What lies up the way of the air, through lines, from a chamber of a rig."""
+    """Find the valve or regulator that feeds a chamber, through lines."""
     here, passed = dotted("chamber", chamber), set()
     while here not in passed:
         passed.add(here)
@@ -268,9 +268,7 @@ def _feed(
 
 
 def _behind(place: str, lines: Mapping[str, Mapping[str, str]]) -> tuple[str | None, str | None]:
-    """The supply behind a valve, and the channel of what it fills from; lines between the two are
-    passed.
-    """
+    """Supply behind a valve, lines passed, and the channel of the pressure before the valve."""
     block, name = place.partition(".")[0], _short(place)
     if block == "supply":
         return name, dotted("supply_pressure", name)

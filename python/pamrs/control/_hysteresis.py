@@ -181,7 +181,7 @@ class HysteresisCompensation(SampledController):
         self.reset()
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """What the controller answers with the memory moved to the sample; see
+        """Command of the controller, after the memory has moved to the sample's angle; see
         :meth:`pamrs.control.Controller.update`.
         """
         angle = (

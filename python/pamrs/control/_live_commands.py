@@ -1,5 +1,5 @@
-"""What a live loop writes: a number for a plant of one command, commands by name for others; what
-is safe for each, and within which limits each is kept.
+"""Commands of a live loop: a number for a plant with one command, else a mapping by name; the safe
+value and the limits of each.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class LiveCommands:
 
     @property
     def single(self) -> bool:
-        """Whether there is one command, which is written as a number."""
+        """True where there is one command, which is written as a number."""
         return len(self.names) == 1
 
     def written(self, values: Mapping[str, Any]) -> Any:
@@ -79,7 +79,7 @@ class LiveCommands:
         return values[self.names[0]] if self.single else dict(values)
 
     def kept(self, answer: Any) -> dict[str, float]:
-        """What a controller answered, by name and within the limits.
+        """Commands of a controller's answer by name, clipped to the limits.
 
         Raises
         ------
@@ -139,7 +139,7 @@ class LiveCommands:
 
 
 def _ranges_of_safe(controller: Controller, safe: Any) -> dict[str, tuple[float, float, float]]:
-    """Commands of a controller that does not say them: those that have a safe value."""
+    """Unbounded ranges for commands that the controller does not name: those with a safe value."""
     if not isinstance(safe, Mapping) or not safe:
         raise refused(
             "safe",

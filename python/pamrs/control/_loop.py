@@ -346,8 +346,8 @@ def trajectories_of(
 
 
 def measured_by(controller: Controller, measured: Mapping[str, str] | None) -> dict[str, str]:
-    """What the controller calls a channel -> the rig's name of it; a controller of one joint with a
-    name says it itself.
+    """Names of the rig for the channels that a controller reads; a controller of one named joint
+    needs none given.
 
     Parameters
     ----------
@@ -455,8 +455,8 @@ def tracked_of(rig: Rig, measured: Mapping[str, str] | None) -> tuple[str, str]:
 
 
 def actuation_of(rig: Rig, controller: Controller) -> Actuation:
-    """What a single command drives: the only valve, or the only regulator of a rig without valves;
-    what answers every input is left as it is.
+    """Function from a single command to the keywords of ``Simulator.step``: it drives the only
+    valve, or the only regulator of a rig without valves; commands by name are passed on.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
-"""What a model-based controller knows of its arm: inertia, gravity, and the torque of the muscles
-as a line in what it asks for.
+"""Equations of motion of model-based controllers: inertia, gravity, and the muscle torque as a line
+in the pressure.
 """
 
 from __future__ import annotations
@@ -61,12 +61,12 @@ class JointModel(abc.ABC):
     @property
     @abc.abstractmethod
     def joints(self) -> int:
-        """How many joints."""
+        """Number of joints."""
 
     @property
     @abc.abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
-        """What the torque is linear in, in the order of :meth:`regressor`."""
+        """Parameters in which the torque is linear, in the order of :meth:`regressor`."""
 
     @property
     def gains(self) -> tuple[Value, ...]:
@@ -232,7 +232,7 @@ class ArmModel(JointModel):
         )
 
     def replace(self, **changes: Any) -> Self:
-        """The same with other attributes."""
+        """Copy of the model with other attributes."""
         return dataclasses.replace(self, **changes)
 
     def scaled(self, factor: Value) -> Self:
@@ -269,7 +269,7 @@ class ArmModel(JointModel):
         return moved + self.weight * self.lever(angle) + self.springs(angle)
 
     def lever(self, angle: Value) -> Value:
-        """What gravity pulls with, of :attr:`weight`: ``sin(theta + tilt)``."""
+        """Factor of :attr:`weight` in the torque of gravity [1]: ``sin(theta + tilt)``."""
         return sin(angle + self.tilt)
 
     def springs(self, angle: Value) -> Value:

@@ -288,7 +288,7 @@ class Neural(SlidingController):
         s: Array,
         switching: Array,
     ) -> Array:
-        """The same for a batch, each plant with weights of its own."""
+        """Desired pressure [Pa] of a batch, each plant with its own weights, which are adapted."""
         n = s.size
         networks = [self._rows_of(name, n) for name in NETWORKS]
         for name, weights in zip(NETWORKS, networks, strict=True):

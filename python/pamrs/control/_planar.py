@@ -184,7 +184,7 @@ class PlanarArmModel(JointModel):
         )
 
     def replace(self, **changes: Any) -> PlanarArmModel:
-        """The same with other attributes."""
+        """Copy of the model with other attributes."""
         return dataclasses.replace(self, **changes)
 
     def scaled(self, factor: float) -> PlanarArmModel:
@@ -197,7 +197,7 @@ class PlanarArmModel(JointModel):
 
     @property
     def joints(self) -> int:
-        """How many joints."""
+        """Number of joints."""
         return len(self.names)
 
     @property

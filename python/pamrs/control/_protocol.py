@@ -1,4 +1,4 @@
-"""What every controller is: sampled, with a state of its own, for one plant or for a batch of them.
+"""Protocol of controllers: sampled, with a state of their own, for one plant or a batch of them.
 
 A controller is made once, with its gains and its period, and is then called at each of its
 samples::
@@ -33,7 +33,7 @@ Measurement: TypeAlias = "Mapping[str, Value]"
 
 
 class Reference(NamedTuple):
-    """Where the joint should be."""
+    """Desired motion of a joint at one time or at many."""
 
     angle: Value
     """[rad]"""

@@ -137,7 +137,7 @@ class Recruitment(Share):
 
     @property
     def active(self) -> Value:
-        """How many groups are recruited, those on their way included."""
+        """Number of groups that are recruited or on their way."""
         return self._active
 
     @property
@@ -201,8 +201,8 @@ class Recruitment(Share):
         lines: Sequence[tuple[Value, Value]],
         supply: Value,
     ) -> Value:
-        """Add or drop groups, by what is needed now and a horizon ahead; the pressure [Pa] that
-        those that are active then need.
+        """Add or drop groups, by what is needed now and a horizon ahead; return the pressure [Pa]
+        that the active ones then need.
         """
         low, high = self.angle_range
         soon = clip(angle + self.horizon * self.angle_rate.update(angle), low, high)
@@ -235,7 +235,7 @@ class Recruitment(Share):
         return pressure
 
     def _move(self, supply: Value, needed: Value) -> None:
-        """A step of every share along its ramp."""
+        """Move every share one sample along its ramp."""
         step = self.period / self.ramp
         left = clip((supply - needed) / self.reserve if self.reserve else 1.0, _SLOWEST, 1.0)
         for k, name in enumerate(self._shares):

@@ -341,7 +341,7 @@ class RigController(SampledController):
         pressures: list[Value],
         supplies: list[Value],
     ) -> dict[str, Any]:
-        """From the drive of the joints to the commands of their air."""
+        """Convert the drive of the joints to the commands of valves and regulators."""
         arm = self.model.arm
         at = aim.angle if self._commanded else sample["joint_angle"]
         c1, c2 = arm.torque.at(self._full(at))
@@ -374,8 +374,8 @@ class RigController(SampledController):
         pressures: Sequence[Value],
         supplies: Sequence[Value],
     ) -> tuple[dict[str, Value], dict[str, Any]]:
-        """Pressure of every chamber [Pa], and whether it is open to the ambient, of the drives,
-        torques and angles of the joints.
+        """Pressure of every chamber [Pa] for the drives, torques and angles of the joints, and True
+        for each that is open to the ambient.
         """
         wanted: dict[str, Value] = {}
         idle: dict[str, Any] = {}
@@ -448,7 +448,7 @@ class RigController(SampledController):
         )
 
     def _rows_held(self, angle: ArrayLike) -> Any:
-        """The angles that are to be held as the model has them, within their ranges."""
+        """Angles to hold, in the rows of the model, within their ranges."""
         joints, rest_length = len(self.joints), self._rest_length
         at = np.asarray(angle, dtype=np.float64)
         if rest_length is not None:
@@ -478,8 +478,8 @@ class RigController(SampledController):
                 )
 
     def _asked(self, each: Sequence[Sequence[Value]]) -> dict[str, Value]:
-        """Pressure of every chamber [Pa] for drives, torques and angles; the shares stay as they
-        are.
+        """Pressure of every chamber [Pa] for drives, torques and angles; the state of the shares is
+        kept.
         """
         groups, before = self.model.groups, self._before.take()
         rest, limit = [0.0] * len(groups), [self.model.pressure_limit] * len(groups)
@@ -500,8 +500,8 @@ class RigController(SampledController):
         return start
 
     def _drifting(self, start: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Rate of every joint [rad/s] a short sample after initial values, in the sense of the
-        model, and the rate below which it rests.
+        """Rate of every joint [rad/s] shortly after initial values, signed as in the model, and the
+        rate below which a joint counts as at rest.
         """
         rig = resting(self.model.rig)
         simulator = Simulator(rig, sample_time=SAMPLE, initial=start)

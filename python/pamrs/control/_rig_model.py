@@ -1,4 +1,4 @@
-"""What controllers know of a rig: its arm, the muscles of every joint, the way of their air."""
+"""Models of a rig for controllers: its arm, the muscles of every joint, the way of their air."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _LAWS: Final[dict[str, Callable[..., Controller]]] = {
 
 
 class RigModel:
-    """What controllers know of a rig: its arm, the muscles of every joint, the way of their air.
+    """Rig as a model for controllers: its arm, the muscles of every joint, the way of their air.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class RigModel:
         return tuple(self._torques[group.chamber] for group in self.of_joint(joint))
 
     def opposed(self, joint: str) -> bool:
-        """Whether muscles on both sides turn a joint."""
+        """True where muscles on both sides turn a joint."""
         return len({torque.sign for torque in self.torques_of(joint)}) > 1
 
     def pressure_loop(

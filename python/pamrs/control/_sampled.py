@@ -1,5 +1,4 @@
-"""What all controllers here have in common: an explicit state, a clock that is watched, and
-channels that are checked.
+"""Base of all controllers here: an explicit state, a clock that is watched, checked channels.
 
 **Time.** A controller is discrete: its filters and integrals are made for its period, and every
 update counts as one period. A sample that comes between half and one and a half periods after the
@@ -77,9 +76,7 @@ class Stateful:
         return np.shape(start)[-1:] if isinstance(start, list) else ()
 
     def _leaves(self) -> dict[str, bool]:
-        """Every attribute in which a number of the state is kept, dotted, and whether it is changed
-        in place.
-        """
+        """Dotted attributes that hold the state, and True for each that is changed in place."""
         found = {f"_{name}": isinstance(start, list) for name, start in self._start().items()}
         for part in self._PARTS:
             one = getattr(self, part)
@@ -135,8 +132,7 @@ class Stateful:
 
 
 class Fixed:
-    """What a controller was made with: it can be read, not set, since what follows from it is
-    worked out once.
+    """Read-only attribute of a controller: other attributes are computed from it once.
 
     Parameters
     ----------
@@ -365,9 +361,7 @@ class SampledController(Stateful, Controller):
         )
 
     def _sized(self, name: str, value: Any) -> Value:
-        """What is not a finite float already: an array of the batch's length, or something to
-        refuse.
-        """
+        """Checked float or array of the batch's length, for a value that is no finite float yet."""
         try:
             checked = as_value(name, value)
         except ParameterError as error:
@@ -385,5 +379,5 @@ def _copied(value: Any) -> Any:
 
 
 def _is(value: Any, kind: type) -> bool:
-    """Whether it is a number of a kind, truth values left out."""
+    """True where a value is an instance of a kind of number, truth values left out."""
     return isinstance(value, kind) and not isinstance(value, bool)

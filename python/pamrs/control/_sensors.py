@@ -1,4 +1,4 @@
-"""What a controller is told of the plant: noise, resolution and delay of its sensors, seeded."""
+"""Sensors between plant and controller, seeded: noise, resolution and delay."""
 
 from __future__ import annotations
 
@@ -105,8 +105,8 @@ class Reader:
 
     @property
     def state(self) -> dict[str, Any]:
-        """What everything to come depends on (copies): ``late``, the samples on their way, and
-        ``random``.
+        """State of the readings to come (copies): ``late``, the delayed samples, and ``random``,
+        the generator.
         """
         return {
             "late": [dict(sample) for sample in self._late],
@@ -177,7 +177,7 @@ def _there(sample: Measurement, channel: str) -> Value:
 
 
 def reader_of(sensors: Sensors | Reader | None, period: float) -> Reader | None:
-    """What a loop reads by: sensors begin, a reader goes on.
+    """Reader of a loop: newly started from sensors, or one that goes on.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
-"""How the muscles of a joint share its torque: from the drive or the torque that a law asks for to
-the pressure of each chamber.
+"""Shares of the muscles of a joint in its torque: from the drive or the torque that a law asks for
+to the pressure of each chamber.
 
 A share is asked once for each sample of the controller, in order, so that one with a state
 (:class:`pamrs.control.Recruitment`) can count time.
@@ -25,7 +25,7 @@ _LEAST_STIFFNESS_GAIN = 1e-12  # N m/rad per Pa: below it the pressures do not c
 
 
 class Demand(NamedTuple):
-    """What is asked of the muscles of a joint at a sample."""
+    """Demand on the muscles of a joint at a sample."""
 
     time: float
     """[s]"""
@@ -42,7 +42,7 @@ class Demand(NamedTuple):
 
 
 class Share(Stateful):
-    """How the groups of a joint share its torque.
+    """Rule by which the groups of a joint share its torque.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ class CoContraction(Share):
 
 
 def stiffness_of(value: Any) -> Value | None:
-    """A stiffness [N m/rad], checked; None as it is."""
+    """Checked stiffness [N m/rad]; None stays None."""
     return None if value is None else as_value("stiffness", value, lower=0.0)
 
 

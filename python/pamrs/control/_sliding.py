@@ -29,7 +29,7 @@ from pamrs.control._values import as_value, clip, positive_gain, sign
 
 
 class Surface(NamedTuple):
-    """Where a sample stands relative to the sliding surface."""
+    """State of a sample relative to the sliding surface."""
 
     angle: Value
     """Filtered angle [rad]."""
@@ -46,8 +46,7 @@ class Surface(NamedTuple):
 
 
 class SlidingController(SampledController):
-    """What the sliding family has in common: the surface, its switching term, and the limits of the
-    pressure.
+    """Base of the sliding family: the surface, its switching term, and the limits of the pressure.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from pamrs.simulation import Batch, BatchRun, default_step, whole_samples
 
 @dataclass(frozen=True)
 class Sweep:
-    """What n closed loops did; NaN where a plant ended before its time.
+    """Result of n closed loops; NaN where a plant ended before its time.
 
     Attributes
     ----------
@@ -52,9 +52,7 @@ class Sweep:
 
 
 class _Sums:
-    """nu, omega and the largest error of every plant, sample by sample, so that nothing has to be
-    kept.
-    """
+    """Running nu, omega and largest error of every plant, so that no samples are kept."""
 
     def __init__(self, n: int, factor: float) -> None:
         self._factor = factor
@@ -63,9 +61,7 @@ class _Sums:
         self.error = np.zeros(n)
 
     def add(self, time: float, wanted: float, angle: Array, rate: Array) -> None:
-        """Go on to a sample: trapezoids of the squared error, total variation of the slope's
-        sine.
-        """
+        """Add a sample: trapezoids of the squared error, total variation of the slope's sine."""
         self.error = wanted - angle
         square, slope = self.error * self.error, slope_sine(self._factor * rate)
         if self._last is not None:

@@ -43,14 +43,14 @@ def drive_limits(torque: TorqueModel, angle: Value, pressure_limit: float) -> tu
 
 
 class _Straight:
-    """How a muscle pulls on a load: straight, the shortening [m] in the place of an angle."""
+    """Geometry of a muscle that pulls a load straight: its "angle" is the shortening [m]."""
 
     def shortening(self, angle: ArrayLike) -> Array:
-        """Itself [m]."""
+        """Return the argument: the shortening [m]."""
         return np.asarray(angle, dtype=np.float64)
 
     def torque_arm(self, angle: ArrayLike) -> Array:
-        """1."""
+        """Ones: change of the shortening with itself [1]."""
         return np.ones_like(np.asarray(angle, dtype=np.float64))
 
 
@@ -77,9 +77,8 @@ def rest_length_of(rig: Rig) -> float:
 
 
 def _parts(rig: Rig, muscle: str | None = None) -> tuple[Muscle, Any, dict[str, Any]]:
-    """A muscle of a rig, how it pulls, and the table of the joint that it turns, or the ends of the
-    shortening where it pulls on a load; without a name the only muscle of a rig with one joint and
-    one link.
+    """Muscle of a rig, its geometry, and the joint's table or the ends of the shortening of a load;
+    without a name the only muscle of a rig with one joint and one link.
     """
     if rig.tables("load"):
         if muscle is None:

@@ -75,7 +75,7 @@ def as_value(
 
 
 def gains_of(names: Sequence[str], gains: Sequence[Any]) -> tuple[Value, ...]:
-    """A gain from zero on for each of some names, see :func:`as_value`."""
+    """Check that a gain is at least zero for each of some names; see :func:`as_value`."""
     if len(gains) != len(names):
         raise ParameterError(
             f"gains has {len(gains)} entries: {len(names)} are needed, for {', '.join(names)}"
@@ -112,17 +112,13 @@ def positive_number(name: str, value: Any) -> float:
 
 
 def limits_around(limits: Any, null: Any) -> tuple[float, float, float]:
-    """Limits of an output and what is put out for no error, checked: two finite numbers, the first
-    below the second, null within.
-    """
+    """Check limits of an output and its null: two rising finite numbers, the null between them."""
     low, high = rising("limits", limits)
     return low, high, checked_number("the null of limits", null, low, high)
 
 
 def angle_factor(unit: str) -> float:
-    """How many of a unit, ``"rad"`` or ``"deg"``, are in a radian; a ParameterError for another
-    one.
-    """
+    """Number of units, ``"rad"`` or ``"deg"``, in a radian; a ParameterError for another unit."""
     one_of("unit", unit, _PER_RADIAN)
     return _PER_RADIAN[unit]
 

@@ -303,7 +303,7 @@ class _Loop:
         ] = []
 
     def run(self, termination: Termination) -> str:
-        """To the end or until the sensor is lost; only in here a signal may raise."""
+        """Run to the end, or until the sensor is lost; only in here a signal may raise."""
         termination.armed = True
         try:
             return self._run()
@@ -340,7 +340,7 @@ class _Loop:
         return "finished"
 
     def _wait(self, due: float) -> float:
-        """By how much it is past a time, which is waited for."""
+        """Wait for a time; return the lateness [s]."""
         ahead = due - self.clock.now()
         if 0.0 < ahead < 2.0 * self.period:
             self.clock.sleep(ahead)
@@ -371,9 +371,7 @@ class _Loop:
         self._note(wanted, late, reading)
 
     def _without_reading(self, late: float) -> None:
-        """A period that the controller lives through with the last reading, and the plant with the
-        last command.
-        """
+        """Run a period with the last reading for the controller, the last command for the plant."""
         self.in_a_row += 1
         wanted = self._wanted()
         if self.last is not None:
@@ -428,7 +426,7 @@ class _Loop:
         return why
 
     def result(self, reason: str) -> LiveRun:
-        """What happened."""
+        """Record of the loop up to now, with the reason for its end."""
         when, late = (np.array([row[i] for row in self.rows], dtype=np.float64) for i in (0, 3))
         wanted = np.array([row[1] for row in self.rows], dtype=np.float64)
         held = {

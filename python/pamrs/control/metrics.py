@@ -1,5 +1,5 @@
-"""How well a loop follows, by the metrics of 4.4.1 and the usual ones; for one run
-``(samples,)`` or a batch ``(n, samples)``.
+"""Metrics of tracking: those of 4.4.1 and the usual ones, for one run ``(samples,)`` or a batch
+``(n, samples)``.
 
 The curvature (4.16) of the graph of angle over time adds a rate squared to one, so its value, and
 with it the optimum by (4.18), depends on the units that the axes carry: in degrees and seconds a
@@ -42,7 +42,7 @@ WEIGHTS: Final = (0.25, 0.75)
 
 @dataclass(frozen=True)
 class Metrics:
-    """What :func:`evaluate` found; floats for one run, arrays of shape (n,) for a batch.
+    """Result of :func:`evaluate`; floats for one run, arrays of shape (n,) for a batch.
 
     Attributes
     ----------
@@ -358,7 +358,7 @@ def _error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> tuple[Arr
 
 
 def _factor(unit: str) -> float:
-    """How many of a unit are in a radian, or in a metre of a length."""
+    """Number of units in a radian, or in a metre for a length."""
     return 1.0 if unit == "m" else angle_factor(unit)
 
 
@@ -407,9 +407,7 @@ def _plain(values: ArrayLike) -> float | Array:
 
 
 def _integral(time: Array, values: Array) -> Array:
-    """Integral over time along the last axis by the trapezoidal rule (numpy 1 and 2 name theirs
-    differently).
-    """
+    """Integral over time along the last axis by the trapezoidal rule, for numpy 1 and 2."""
     return np.asarray(
         (0.5 * (values[..., 1:] + values[..., :-1]) * np.diff(time)).sum(axis=-1), dtype=np.float64
     )

@@ -143,8 +143,8 @@ class SimulatedDevice:
 
     @property
     def command(self) -> Any:
-        """What is held: a number, or a mapping of names to one; without a regulator that feeds a
-        valve, until a command has it.
+        """Command that is held: a number for a single one, else a mapping by name; regulators that
+        feed a valve are left out until they are written.
         """
         told = {name: self._held[name] for name in self._needed}
         return next(iter(told.values())) if len(told) == 1 else told

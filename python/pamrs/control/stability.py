@@ -59,11 +59,11 @@ class Margins:
 
     @property
     def stable(self) -> bool:
-        """Whether the closed loop is."""
+        """True where every eigenvalue of the closed loop is inside the unit circle."""
         return self.radius < 1.0
 
     def __str__(self) -> str:
-        """What the margins say, with units."""
+        """Sentence with stability, margins and nearest boundary, with units."""
         factor = "no gain"
         if math.isfinite(self.gain):
             factor = f"all gains times {self.gain:.3g} (at {self.gain_frequency:.3g} rad/s)"
@@ -181,9 +181,7 @@ def margins(
 
 
 def _delayed(model: LinearModel, period: float, delay: float) -> tuple[Array, Array, Array]:
-    """The sampled plant with the commands on their way as states: state, input and output
-    matrix.
-    """
+    """State, input and output matrix of the sampled plant, with commands under way as states."""
     positive("delay", delay, zero=True)
     phi, gamma = model.sampled(period)
     count = math.ceil(delay / period - 1e-9)

@@ -1,5 +1,4 @@
-"""Where the joint should be over time: the trajectories of chapters 4 and 6, steps, and a user's
-table.
+"""Trajectories of joint angles: those of chapters 4 and 6, steps, and a user's table.
 
 All angles are radians in and out (``numpy.deg2rad`` or :func:`pamrs.control.trajectories.degrees`
 for the printed ones), rates and accelerations are the analytic derivatives of the angle. Where the
@@ -49,7 +48,7 @@ class Shape(Protocol):
         """Angle, rate, acceleration at one time."""
 
     def over(self, time: Array) -> tuple[Array, Array, Array]:
-        """The same at many."""
+        """Angles, rates, accelerations at many times."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,7 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class JointTrajectories:
-    """Where several joints should be: a trajectory for each.
+    """Trajectories of several joints, one for each.
 
     Attributes
     ----------

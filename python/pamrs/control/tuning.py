@@ -156,7 +156,7 @@ class GainMap(View, Tabular):
 
 @dataclass(frozen=True)
 class GainSearch:
-    """What a search found.
+    """Result of a search for gains.
 
     Attributes
     ----------
