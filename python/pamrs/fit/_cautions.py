@@ -1,5 +1,5 @@
-"""What to know before using the numbers of a fit: what its points hardly tell, what is implausible,
-which point stands apart.
+"""Cautions about the numbers of a fit: poorly determined moduli, implausible values, outlying
+points.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def cautions(
 
 
 def _range(problem: Problem, found: Estimate, rows: Mask, unknowns: int) -> list[str]:
-    """Lengths, pressures and points that are too few for the unknowns."""
+    """Cautions about lengths, pressures or points that are too few for the unknowns."""
     notes = []
     span = float(np.ptp(problem.length[rows])) / problem.blank.parameters["rest_length"]
     if found.condition_number > _LARGE_CONDITION:
@@ -89,7 +89,7 @@ def _range(problem: Problem, found: Estimate, rows: Mask, unknowns: int) -> list
 
 
 def _moduli(found: Estimate, parameters: Parameters) -> list[str]:
-    """Moduli that the points do not tell, or that no rubber has."""
+    """Cautions about moduli that the points hardly determine, or that no rubber has."""
     notes = []
     moduli = [parameters[name] for name in found.design.names]
     unsure = sum(item.stderr > abs(item.value) for item in moduli)
@@ -109,7 +109,9 @@ def _moduli(found: Estimate, parameters: Parameters) -> list[str]:
 
 
 def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list[str]:
-    """Free geometry that the points do not tell, or that went far from where it was known to be."""
+    """Cautions about free geometry that the points hardly determine, or that moved far from its
+    nominal.
+    """
     notes = []
     if not found.success:
         notes.append(f"the search of the geometry did not converge: {found.message}")
@@ -137,7 +139,7 @@ def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list
 
 
 def _points(problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str]) -> list[str]:
-    """Points that the others do not predict."""
+    """Cautions about points that the others do not predict."""
     apart = outlying(problem, found, rows)
     if not apart:
         return []
@@ -201,9 +203,7 @@ def outlying(problem: Problem, found: Estimate, rows: Mask) -> list[tuple[int, f
 
 
 def _scatter(scaled: Array, told: Mask, level: Index) -> Array:
-    """Standard deviation about each point from medians: of all points, or of its own level where
-    that scatters more.
-    """
+    """Scatter of each point by medians: of all points, or of its own level where that is larger."""
     spread = np.full(len(scaled), _MAD * float(np.median(np.abs(scaled[told]))))
     for group in np.unique(level):
         own = told & (level == group)
@@ -221,9 +221,7 @@ def _basis(matrix: Array) -> Array:
 
 
 def _loops(problem: Problem, found: Estimate, rows: Mask) -> list[str]:
-    """Hysteresis that a muscle without friction leaves in the residuals; the elbow model has a
-    branch of its own for it.
-    """
+    """Cautions about directions of motion: only one, exchanged, or loops without friction."""
     way, force = problem.direction[rows], problem.force[rows]
     rubs = problem.blank.has_friction
     if len(way) and not rubs and np.all(way == way[0]) and way[0] != 0:

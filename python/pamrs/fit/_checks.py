@@ -50,7 +50,7 @@ def check_rest_length(muscle: Muscle, rest_length: float) -> None:
 
 
 def reachable(length: Array, rest: float) -> Mask:
-    """Whether a muscle of this rest length could have each length; True for NaN."""
+    """True where a muscle of this rest length could have a length, and for NaN."""
     ratio = length / rest
     return ~((ratio < _LENGTH_LOW) | (ratio > _LENGTH_HIGH))
 

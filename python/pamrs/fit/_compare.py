@@ -272,9 +272,7 @@ def recommend(eligible: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _loops(data: ForceMap, muscle: Muscle, direction: str | None) -> tuple[str, ...]:
-    """A note where the rows are loops and the muscle has no friction: only one model then has two
-    branches.
-    """
+    """Note on loops of a muscle without friction, for which only one model has two branches."""
     if direction is None or muscle.has_friction or not data.has_loops:
         return ()
     return (
@@ -292,9 +290,7 @@ _COLUMNS: Final = (
 
 
 def _level_squares(fit: MuscleFit) -> Array:
-    """Sum of squared leave-one-pressure-out errors of each level, in squares of the map's largest
-    force.
-    """
+    """Squared leave-one-pressure-out errors of each level, over the squared largest force."""
     top = float(fit.data.force[fit.data.used].max())
     return fit.leave_one_pressure_out().level_squares() / top**2
 

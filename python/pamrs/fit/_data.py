@@ -266,8 +266,8 @@ class ForceMap:
 
     @property
     def issues(self) -> list[str]:
-        """What was found, in words: how many rows are not used, why, and the first of them, then
-        what concerns no single row.
+        """Issues of the map in words: number of unused rows, why they are unused, and the first of
+        them, then remarks on the map as a whole.
         """
         return [*self._counts(), *self.notes]
 
@@ -297,7 +297,7 @@ class ForceMap:
         return f"{one if len(rows) == 1 else several} {shown}{more}"
 
     def labels(self) -> list[str]:
-        """What each used row is called: its row in the file, or else its index."""
+        """Label of each used row: its row in the file, or else its index."""
         used = np.flatnonzero(self.used)
         if self.row_numbers is None:
             return [f"index {index}" for index in used]
@@ -305,7 +305,7 @@ class ForceMap:
 
     @property
     def has_loops(self) -> bool:
-        """Whether used rows go both ways."""
+        """True where there are used rows of both directions."""
         way = self.direction[self.used]
         return bool(np.any(way < 0) and np.any(way > 0))
 
@@ -446,7 +446,7 @@ def _column(values: ArrayLike) -> Array:
 
 
 def _solved(muscle: Muscle, contraction: Array, rows: Mask) -> Mask:
-    """Whether the geometry has a solution at each of some contractions; True for the other rows."""
+    """True where the geometry has a solution at a contraction, and for rows outside of ``rows``."""
     solved = np.ones(len(contraction), dtype=bool)
     try:
         muscle.radius(contraction[rows])

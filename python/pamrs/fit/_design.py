@@ -121,7 +121,7 @@ class Design:
 
     @property
     def kinds(self) -> tuple[tuple[tuple[str, int, float], ...], ...]:
-        """What each coefficient is a sum of: parameter of the muscle, place in it, factor;
+        """Terms that each coefficient adds up: parameter of the muscle, index in it, factor;
         ``("modulus_slope", 0, 1.0)`` for ``m1``.
         """
         kinds, places = ("modulus_slope", "modulus_offset"), range(len(self.base))

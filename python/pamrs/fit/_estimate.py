@@ -31,9 +31,7 @@ class Free:
     tolerance: float
 
     def moved(self, value: float) -> float:
-        """How far a value lies from the nominal one, in tolerances; an infinite tolerance moves by
-        nothing.
-        """
+        """Deviation of a value from the nominal one, in tolerances; 0 for an infinite tolerance."""
         return (value - self.nominal) / self.tolerance
 
     @property
@@ -46,8 +44,8 @@ class Free:
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of one kind of coefficient before the fit: its values (zero beyond the last)
-    and one standard deviation.
+    """Prior of one kind of coefficient: its values (zero beyond the last) and one standard
+    deviation.
     """
 
     values: tuple[float, ...]
@@ -155,7 +153,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a fit found.
+    """Result of an estimate.
 
     Attributes
     ----------
@@ -232,7 +230,7 @@ def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Est
 
 
 def _check_counts(problem: Problem, design: Design, rows: Mask) -> None:
-    """Name what is missing before the algebra does."""
+    """Refuse a fit with fewer points than unknowns, by level where the moduli are free at each."""
     n, k = int(rows.sum()), len(design.names)
     # a coefficient with a prior needs no point
     told = int(np.count_nonzero(problem.expected(design)[1]))
@@ -319,7 +317,7 @@ def _at(
 def geometry_slopes(
     problem: Problem, values: Array, function: Callable[[Muscle], Array], n: int
 ) -> Array:
-    """Differences of a function of the muscle by the free geometry.
+    """Finite differences of a function of the muscle over the free geometry.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ _NUMBERS: Final = (
 
 
 def fit_report(fit: MuscleFit) -> str:
-    """What :meth:`MuscleFit.fit_report` returns."""
+    """Text of :meth:`MuscleFit.fit_report`."""
     order = "" if fit.order is None else f", order {fit.order}"
     law = "linear in pressure" if fit.moduli_kind == "linear" else "free at each level"
     moduli = f", moduli {law}" if fit.nvarys else ""
@@ -91,7 +91,7 @@ def _scatter(fit: MuscleFit) -> str:
 
 
 def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
-    """What :meth:`MuscleFit.to_rig` returns."""
+    """Rig of :meth:`MuscleFit.to_rig`: the given one, or a bench, with the fitted muscle."""
     muscle = fit.muscle
     parameters = dict(muscle.parameters)
     if rig is None:
@@ -113,7 +113,7 @@ def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
 
 
 def to_lmfit(params: Mapping[str, Any], covar: Array) -> Any:
-    """What :meth:`MuscleFit.to_lmfit` and :meth:`FrictionFit.to_lmfit` return.
+    """Parameters of :meth:`MuscleFit.to_lmfit` and :meth:`FrictionFit.to_lmfit`.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def to_lmfit(params: Mapping[str, Any], covar: Array) -> Any:
 
 
 def to_dict(fit: MuscleFit) -> dict[str, Any]:
-    """What :meth:`MuscleFit.to_dict` returns."""
+    """Plain data of :meth:`MuscleFit.to_dict`."""
     by_pressure = fit.error_by_pressure()
     held_out = fit.errors_of("held_out")
     return {

@@ -158,9 +158,7 @@ def read_map(
 def _table(
     file: Path, delimiter: str | None, decimal: str | None, columns: Columns | None
 ) -> tuple[str, Table]:
-    """The table of a file, with headings or, where they are listed, without, and what separates
-    its cells.
-    """
+    """Table of a file, with or without headings, and the separator of its cells."""
     if not is_text(file):
         return ",", table_of(read_log(file))
     if delimiter is None:
@@ -267,9 +265,7 @@ def _understood(
 
 
 def _lacking(channels: Sequence[str], headings: Sequence[str], strange: Sequence[str]) -> str:
-    """What is missing, what there is, and how to map it; a heading whose unit fits alone is
-    proposed.
-    """
+    """Message on missing columns, with the headings that there are and a mapping to copy."""
     maps = []
     for channel in channels:
         fitting = [heading for heading in strange if _measures(heading, _UNITS[channel])]
@@ -288,7 +284,7 @@ def _lacking(channels: Sequence[str], headings: Sequence[str], strange: Sequence
 
 
 def _measures(heading: str, si_unit: str) -> bool:
-    """Whether a heading has a unit of this dimension."""
+    """True where a heading has a unit of this dimension."""
     match = _HEADING.match(heading)
     try:
         return match is not None and same_dimension(match["unit"].strip(), si_unit)
@@ -395,7 +391,7 @@ def _one_specimen(table: Table, strange: Sequence[str], source: str) -> None:
 
 
 def _channels(table: Table, found: Mapping[str, _Column]) -> list[str]:
-    """Headings for :func:`load_recording`: canonical channels, nothing for the other columns."""
+    """Headings for :func:`load_recording`: canonical channels, ``""`` for the other columns."""
     if "contraction" in found:
         raise RecordingError(
             "a recording with a time column needs the column length, not contraction"

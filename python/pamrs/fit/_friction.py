@@ -173,15 +173,15 @@ class FrictionFit(View):
 
     @property
     def told(self) -> bool:
-        """Whether the loops tell a friction from none: all levels together, by four standard
-        errors, at two levels above the floor.
+        """True where the loops distinguish a friction from none: two levels or more are above the
+        floor, and all levels together are by four standard errors.
         """
         mean, spread = _pooled(self.levels)
         return self.ndata >= 2 and mean > _SURE * spread
 
     @property
     def slope_significant(self) -> bool:
-        """Whether the slope over pressure differs from zero at 5 %; False where that cannot be
+        """True where the slope over pressure differs from zero at 5 %; False where that cannot be
         tested.
         """
         return self.slope_pvalue < _SIGNIFICANT
@@ -433,7 +433,7 @@ def _isometric_levels(data: ForceMap, held: list[Index]) -> tuple[list[FrictionL
 
 
 def _doubts(levels: list[FrictionLevel], above: Mask, floor: float) -> list[str]:
-    """What speaks against a law: levels at the floor, branches that are exchanged."""
+    """Doubts about a friction law: levels at the floor, branches that are exchanged."""
     found: list[str] = []
     if above.sum() == 1:
         found.append(
@@ -470,8 +470,8 @@ def _loop(
 def _pairs(
     abscissa: Array, force: Array, way: NDArray[np.int8]
 ) -> tuple[Array, Array, Array] | str:
-    """Where both branches of a loop are known, their mean there and half their difference; or why
-    nowhere.
+    """Contractions that both branches of a loop cover, their mean force there and half their
+    difference; or the reason why there are none.
     """
     branches = [(abscissa[way == d], force[way == d]) for d in (-1, 1)]
     for (at, _), word in zip(branches, ("contracting", "lengthening"), strict=True):
@@ -569,7 +569,9 @@ def _pvalue(line: LevelLine, free: int) -> float:
 
 
 def _presliding(data: ForceMap, levels: list[FrictionLevel]) -> tuple[float | None, str]:
-    """From each reversal, how far the force needs to get halfway to the other branch."""
+    """Median presliding distance [m] over the reversals, in which 2/7 of it leads halfway to the
+    other branch, and words on it; None where it is not determinable.
+    """
     _, contraction, force, level, way = data.used_rows()
     coefficients = {int(np.argmin(np.abs(data.levels - x.pressure))): x.coefficient for x in levels}
     turns = np.flatnonzero((level[1:] == level[:-1]) & (way[1:] == -way[:-1]) & (way[1:] != 0)) + 1

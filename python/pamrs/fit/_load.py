@@ -179,7 +179,7 @@ _ZEROS: Final[dict[str, Any]] = {
 
 
 class Description(NamedTuple):
-    """What a description says.
+    """Content of a force map description.
 
     Attributes
     ----------

@@ -362,7 +362,7 @@ def _left_out(pressure: Array, contraction: Array, gas: Array, e: Array, pull: A
 
 
 def _unmeasured(pressure: Array, contraction: Array, gas: Array, e: Array) -> list[str]:
-    """Where the table only goes on from its neighbours."""
+    """Remarks on parts of the table that only continue its neighbours."""
     found = []
     step = float(contraction[1] - contraction[0])
     nearest = np.argmin(np.abs(gas[:, None] - pressure[None, :]), axis=1)

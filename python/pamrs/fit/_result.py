@@ -1,4 +1,4 @@
-"""What a fit of a muscle returns."""
+"""Result of a muscle fit: predictions, errors, exports."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ class MuscleFit(View, FitStatistics):
         *,
         length: ArrayLike | None = None,
     ) -> Flags:
-        """Where a prediction extrapolates.
+        """Flags of predictions that extrapolate.
 
         Parameters
         ----------

@@ -48,7 +48,7 @@ _WALLLESS = ("gaylord",)
 
 
 def has_effect(name: str, model: str, geometry: str) -> bool:
-    """Whether a geometry parameter enters the force of a model."""
+    """True where a geometry parameter enters the force of a model."""
     return not (name in _ELLIPTIC_ONLY and geometry == "cylinder") and not (
         name == "wall_thickness" and model in _WALLLESS
     )

@@ -1,5 +1,5 @@
-"""What a rig file may say, and hardly means: valves that never act, chambers that no air reaches,
-friction of nothing, values that are known exactly.
+"""Cautions about a rig file that is allowed and likely mistaken: valves that never act, chambers
+that no air reaches, friction of exactly zero, values without a tolerance.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def cautions_of(
     units: Units,
     text: str = "",
 ) -> list[str]:
-    """What of a model is possible, and most likely a mistake.
+    """Cautions about parts of a model that are possible and most likely mistakes.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def _highest(model: Mapping[str, Any]) -> float | None:
 
 
 def _limitless(model: Mapping[str, Any], units: Units) -> list[str]:
-    """Muscles of which nobody says what pressure they bear."""
+    """Caution where ``limits.max_pressure``, the pressure that the muscles bear, is missing."""
     if not tables_of(model, "muscle") or "max_pressure" in model.get("limits", {}):
         return []
     highest, unit = _highest(model), units.usual("Pa")
@@ -133,8 +133,8 @@ def _strokes(model: Mapping[str, Any], ports: Ports, units: Units) -> list[str]:
 def _stroke(
     label: str, joint: str, muscle: Muscle, shortening: Array, highest: float | None, units: Units
 ) -> list[str]:
-    """What is odd about how far a joint shortens a muscle [m] between its stops, at the highest
-    pressure [Pa].
+    """Cautions about the shortening [m] of a muscle between the stops of its joint, at the highest
+    pressure [Pa]: too little, too far stretched, or beyond its range.
     """
     rest, own = float(muscle.parameters["rest_length"]), f"{label}.rest_length"
     low, high = float(shortening.min()), float(shortening.max())
@@ -167,7 +167,7 @@ def _stroke(
 
 
 def _unfed(model: Mapping[str, Any], ports: Ports) -> list[str]:
-    """Chambers that no air reaches, beside a tank or regulator that feeds nothing."""
+    """Caution where no line or valve feeds a chamber while a supply feeds nothing."""
     lines, valves = ports["line"].values(), ports["valve"].values()
     fed = {ends["to"] for ends in (*lines, *valves)}
     used = {ends["from"] for ends in (*lines, *valves)}
@@ -187,9 +187,7 @@ def _unfed(model: Mapping[str, Any], ports: Ports) -> list[str]:
 
 
 def _frictionless(parameters: Mapping[str, Parameter], units: Units) -> list[str]:
-    """Friction and damping that are nothing, exactly: effects with the same law would be named in
-    their place.
-    """
+    """Cautions about friction of exactly zero, which a diagnosis would replace by effects."""
     found = []
     for name, usual in _usual_friction(parameters).items():
         known = parameters[name]
@@ -229,7 +227,7 @@ def _usual_friction(parameters: Mapping[str, Parameter]) -> dict[str, float]:
 
 
 def _exact(parameters: Mapping[str, Parameter], units: Units) -> list[str]:
-    """Measured values without a tolerance, where others have one."""
+    """Caution about measured values without a tolerance, which a diagnosis takes as exact."""
     if not any(known.tol for known in parameters.values()):
         return ["no value has a tolerance (tol): a diagnosis would take all of them as exact"]
     told = []
@@ -248,7 +246,7 @@ def _exact(parameters: Mapping[str, Parameter], units: Units) -> list[str]:
 
 
 def _shut(label: str, valve: Mapping[str, Any], units: Units) -> list[str]:
-    """A valve that no command opens."""
+    """Caution about a valve that no command opens."""
     if valve["fraction"][-1] == 0.0:
         return [
             f"{label} never passes air: {label}.area_fraction.fraction = {valve['fraction']} "
@@ -266,7 +264,7 @@ def _shut(label: str, valve: Mapping[str, Any], units: Units) -> list[str]:
 
 
 def _strut(label: str, muscle: Mapping[str, Any], units: Units) -> list[str]:
-    """A muscle that pushes more than a rod of rubber as thick as it can bear, held at both ends."""
+    """Caution about a muscle that pushes more than a solid rubber rod of its size could."""
     load, most = muscle["buckling_load"], _borne(muscle)
     if load <= most:
         return []
@@ -285,8 +283,8 @@ def _borne(muscle: Mapping[str, Any]) -> float:
 
 
 def _slack(model: Mapping[str, Any], ports: Ports, text: str, units: Units) -> list[str]:
-    """Muscles that are slack without air because the file says nothing else, where their force
-    model alone pushes back: a file of the time when they did may rely on it.
+    """Cautions about muscles without ``buckling_load`` whose force model alone would push: they are
+    slack without air, which older files do not expect.
     """
     given = tomllib.loads(text).get("muscle", {})
     found: list[str] = []
@@ -326,7 +324,7 @@ def _most_contracted(model: Mapping[str, Any], ports: Ports, name: str) -> float
 
 
 def _late(label: str, valve: Mapping[str, Any], units: Units) -> list[str]:
-    """A pulsed valve whose delays are as long as a period of its carrier."""
+    """Cautions about a pulsed valve whose delays are as long as a period of its carrier."""
     if not valve.get("carrier_frequency"):
         return []
     period = 1.0 / valve["carrier_frequency"]

@@ -1,4 +1,4 @@
-"""What no key of a rig alone shows: numbers of one block that do not go together."""
+"""Problems of a rig that no single key shows: numbers of one block that contradict each other."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def block_problems(model: Mapping[str, Any], units: Units) -> list[str]:
 
 
 def muscle_problems(label: str, muscle: Mapping[str, Any], units: Units) -> list[str]:
-    """What does not go together in a muscle; ``label`` is what the block is called,
+    """Contradictions between the parameters of a muscle; ``label`` is the full name of the block,
     ``"muscle.flexor"``, and ``units`` are those of its file.
     """
     problems = []
@@ -72,7 +72,7 @@ def muscle_problems(label: str, muscle: Mapping[str, Any], units: Units) -> list
 
 
 def _map_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
-    """What is wrong with a table of forces."""
+    """Problems of a table of forces: lengths of its axes, falling values, number of forces."""
     problems = []
     sizes = []
     for axis, most in (("pressure", 200), ("contraction", 400)):
@@ -91,7 +91,7 @@ def _map_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
 
 
 def _valve(label: str, valve: Mapping[str, Any], units: Units) -> list[str]:
-    """What is wrong with a valve's area table and its positions."""
+    """Problems of a valve: its positions, and the lengths and order of its area table."""
     problems = _positions(label, valve)
     opening, fraction, label = valve["opening"], valve["fraction"], f"{label}.area_fraction"
     if len(opening) != len(fraction) or len(opening) < 2:

@@ -94,7 +94,7 @@ def _with_law(rig: Rig, kind: str, key: str, other: str) -> Rig:
 
 
 def _in_other_form(rig: Rig, block: str, name: str) -> dict[str, Any]:
-    """Keys of the other law of a valve's flow that stand for a key of its own."""
+    """Keys of a valve's other law of flow that replace a key of its own, with converted values."""
     if name == "discharge_area_max":
         area = rig.parameters[f"{block}.{name}"]
         sonic = {"value": area.value * _SONIC_CONDUCTANCE, "unit": "m3/(s Pa)"}

@@ -88,8 +88,8 @@ def _edit(place: Any, before: Mapping[str, Any], after: Any, path: tuple[str, ..
 
 
 def _edit_effects(document: Any, before: list[Any], after: Any) -> None:
-    """Bring the list of effects from one content to another: those that are in both with new
-    numbers, the others gone or added at the end; written whole where their order is another.
+    """Edit the list of effects: new numbers in place, others removed or added at the end; written
+    whole where their order differs.
     """
     wanted = [kind_of_entry(effect) for effect in after]
     there = [kind_of_entry(effect) for effect in before if kind_of_entry(effect) in wanted]
@@ -118,7 +118,7 @@ def _key_at(path: tuple[str, ...]) -> Key | None:
 
 
 def _quantity(written: Any) -> tuple[Any, float, bool]:
-    """Value, tolerance and whether each recording has its own, as they are written in SI."""
+    """Value and tolerance of an entry, in SI, and True where each recording has its own value."""
     if not isinstance(written, Mapping):
         return written, 0.0, False
     tol = math.inf if written.get("unknown") else written.get("tol", 0.0)
@@ -126,7 +126,7 @@ def _quantity(written: Any) -> tuple[Any, float, bool]:
 
 
 def _usual(key: Key) -> Any:
-    """A key's default as it is written in SI, None where it has none."""
+    """Default of a key in SI, as a file has it; None where it has none."""
     if key.default is None:
         return None
     return tomllib.loads(f"x = {entry_text(key, key.default, 0.0)}")["x"]
@@ -152,7 +152,7 @@ def _set(
 
 
 def _told_by(tol: float) -> str:
-    """The word that says how well a value is known."""
+    """Key that states a tolerance: ``unknown`` for infinity, ``tol``, or ``""`` for none."""
     return "unknown" if math.isinf(tol) else "tol" if tol else ""
 
 
@@ -183,9 +183,7 @@ def _listed(value: Any) -> list[Any]:
 
 
 def _number_in(value: float, unit: str, si: str, *, difference: bool = False) -> float | None:
-    """The number that `unit` needs to be read as this value, to the last bit; the one with the
-    fewest digits. None where there is none.
-    """
+    """Shortest number that is read in `unit` as this value, to the last bit; None for none."""
     near = from_si(value, unit, si, difference=difference)
     for digits in (12, 15, 16):
         short = float(f"{near:.{digits}g}")

@@ -104,7 +104,7 @@ class Joint:
         }
 
     def shortening(self, angle: ArrayLike) -> Array:
-        """How far the muscle is shortened [m].
+        """Shortening of the muscle [m].
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ class Joint:
         return self._over(self._core.torque_arm, angle)
 
     def reaches(self, angle: ArrayLike) -> Mask:
-        """Whether the joint can have an angle.
+        """True where the joint can have an angle.
 
         Parameters
         ----------

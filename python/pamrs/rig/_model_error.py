@@ -1,4 +1,4 @@
-"""How well a user knows the model: ``[model_error]`` of a rig file.
+"""Stated error of the model: ``[model_error]`` of a rig file.
 
 An entry is named after a kind of block (``muscle = "1 %"``, a share of what the block does to its
 output) or after a measured channel (``joint_angle = "0.1 deg"``, a size, or a share of the range

@@ -239,15 +239,15 @@ class Muscle:
 
     @property
     def has_friction(self) -> bool:
-        """Whether a friction law is given."""
+        """True where a friction law is given."""
         return any(self.parameters[name] for name in _FRICTION)
 
     def without_friction(self) -> Muscle:
-        """The same muscle without friction."""
+        """Copy of the muscle without friction."""
         return self.replace(**dict.fromkeys(_FRICTION, 0.0))
 
     def replace(self, **changes: Any) -> Muscle:
-        """The same muscle with other parameters.
+        """Copy of the muscle with other parameters.
 
         Parameters
         ----------
@@ -400,7 +400,7 @@ class Muscle:
         return self._over(self._core.circumferential_strain, contraction)
 
     def braid_taut(self, contraction: ArrayLike) -> Mask:
-        """Whether the radius has reached its floor in extension; arguments and errors as
+        """True where the radius has reached its floor in extension; arguments and errors as
         :meth:`radius`.
 
         Parameters
@@ -616,7 +616,7 @@ def compiled_law(
     contraction: tuple[float, float],
     tolerance: float,
 ) -> dict[str, Any]:
-    """What :meth:`pamrs.Muscle.from_law` gives to the muscle: axes and forces of a table."""
+    """Table of a force law for :meth:`pamrs.Muscle.from_law`, refined to a tolerance."""
     low, high = rising("pressure", pressure, -101_325.0, _HIGHEST, "Pa")
     short, far = rising("contraction", contraction, -1.0, 1.0, "")
     positive("tolerance", tolerance)

@@ -61,7 +61,7 @@ def bare(block: str, text: str) -> str:
 
 
 def effect_problem(model: Mapping[str, Any], effect: str, place: str) -> str:
-    """What is wrong with the block that an effect acts on, ``""`` where nothing is."""
+    """Problem of the block on which an effect acts, ``""`` where there is none."""
     from pamrs.effects import EFFECTS
 
     info = EFFECTS[effect]
@@ -86,7 +86,7 @@ def effect_problem(model: Mapping[str, Any], effect: str, place: str) -> str:
 
 
 def hanging_problem(entries: Iterable[Mapping[str, Any]]) -> str:
-    """What is wrong with the masses that hang on an arm, ``""`` where nothing is."""
+    """Problem of an arm on which several masses hang, ``""`` where there is none."""
     from pamrs.effects import ports_of
 
     hung = [
@@ -143,8 +143,8 @@ def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:
 
 
 def near_name(given: str, names: Iterable[str], short: Iterable[str] = ()) -> str:
-    """What an unknown name may have meant, else what is there; ``short`` are other ways to say the
-    same names.
+    """Hint on an unknown name: the nearest allowed one, else the allowed ones; ``short`` are other
+    ways to say the same names.
     """
     allowed = list(names)
     near = difflib.get_close_matches(given, [*allowed, *short], n=1)
@@ -167,9 +167,7 @@ class _Connector:
     def settle(
         self, block: str, name: str, port: str, defaults: Iterable[str], wanted: Iterable[str] = ()
     ) -> str | None:
-        """The other end of a port: as given, else the first default that is not empty, else None
-        after noting a problem.
-        """
+        """Other end of a port: the given one, else the first default; None after a problem."""
         label = qualified(block, name)
         info = next(entry for entry in PORTS[block] if entry.name == port)
         text = self.given.get(label, {}).get(port)
@@ -226,9 +224,7 @@ class _Connector:
         return qualified(kind, name) if name in self.tables[kind] else ""
 
     def only(self, kind: str, among: Iterable[str] | None = None, *, of: str = "") -> str:
-        """The only block of a kind, ``""`` if there is none or more; for a block with a name,
-        ``of``, not another's partner.
-        """
+        """Only block of a kind, ``""`` for none, several, or the partner of another than `of`."""
         names = list(self.tables[kind] if among is None else among)
         partners = {*self.tables["valve"], *self.tables["muscle"]}
         if len(names) != 1 or (of and names[0] and names[0] != of and names[0] in partners):
@@ -238,7 +234,7 @@ class _Connector:
     # ------------------------------------------------------------------------- air
 
     def inlets(self) -> None:
-        """What stands in front of regulators: a tank or a constant supply."""
+        """Settle the inlets of regulators: a tank or a constant supply feeds each."""
         for name, table in self.tables["supply"].items():
             label = qualified("supply", name)
             if "inlet" not in self.given.get(label, {}):

@@ -44,7 +44,7 @@ _NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 @dataclass
 class Content:
-    """What a rig file holds: the model, and what is known about its numbers."""
+    """Content of a rig file: the model, what is known of its numbers, and its units."""
 
     name: str
     model: dict[str, Any]
@@ -53,7 +53,7 @@ class Content:
     units: Units = field(default_factory=Units)
 
     def leaves_open(self, dotted: str) -> bool:
-        """Whether a parameter has another value in each recording: ``error = "own"``."""
+        """True where a parameter has another value in each recording: ``error = "own"``."""
         return dotted in self.model.get("own", ())
 
 
@@ -147,7 +147,7 @@ class Reader:
         return Content(name, model, self.tolerances, self.effect_std, self.units)
 
     def limits(self, raw: Any) -> dict[str, Any]:
-        """What the bench allows, under ``limits``; nothing where the file says nothing."""
+        """Limits of the bench from the table ``limits``, in SI; empty where the file has none."""
         if raw is None:
             return {}
         if not isinstance(raw, Mapping):
@@ -283,9 +283,7 @@ class Reader:
     def gauges(
         self, model: dict[str, Any], ports: Mapping[str, Any], document: Mapping[str, Any]
     ) -> None:
-        """Zeros of the gauges at supplies and at inlets of lines that a file leaves out are known
-        as well as those of its chambers.
-        """
+        """Give pressure zeros left out at supplies and line inlets the chambers' tolerance."""
         stated = [
             self.tolerances.get(f"{qualified('sensors', name)}.pressure_zero", 0.0)
             for name in tables_of(model, "sensors")
@@ -299,9 +297,7 @@ class Reader:
                     self.tolerances[f"{qualified(block, name)}.pressure_zero"] = tol
 
     def _length_zero(self, model: dict[str, Any], raw: Any) -> None:
-        """The zero of the length is that of a mass that moves, and a rig has one: sensors without a
-        name have it.
-        """
+        """Keep ``length_zero`` in unnamed sensors of a rig whose mass moves, refuse others."""
         moves = (model["load"] or {}).get("kind") == "mass"
         for name, table in tables_of(model, "sensors").items():
             if moves and not name:
@@ -320,9 +316,7 @@ class Reader:
     # -------------------------------------------------------------------- values
 
     def value(self, block: str, key: Key, raw: Any) -> Any:
-        """The value of one key in SI, None after noting what is wrong with it; ``block`` is what
-        its block is called.
-        """
+        """Value of a key of a block in SI, None after noting a problem."""
         label = ".".join((block, *key.where))
         if raw is None:
             if key.default is None:
@@ -356,9 +350,7 @@ class Reader:
     def quantity(
         self, label: str, key: Key, raw: Any, bare_allowed: bool
     ) -> tuple[Any, str, Mapping[str, Any]]:
-        """Number, unit and the whole table of ``{ value, unit, tol, unknown }``, or of a bare
-        number.
-        """
+        """Number, unit and table of ``{ value, unit, tol, unknown }``, or of a bare number."""
         if not isinstance(raw, Mapping):
             if bare_allowed:
                 return raw, key.unit, {}
@@ -570,9 +562,7 @@ class Reader:
 
 
 def _block_names(block: str, table: Mapping[str, Any]) -> list[str]:
-    """Entries of a block that are blocks with a name, and neither a key of its own nor a mistyped
-    one.
-    """
+    """Entries of a block that are named blocks: neither its own keys nor mistyped ones."""
     own = {*(key.where[0] for key in BLOCKS[block]), *(port.name for port in PORTS.get(block, ()))}
     names = [
         name

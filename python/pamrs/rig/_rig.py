@@ -159,7 +159,7 @@ class Rig(View):
         return copy.deepcopy(tables_of(self._model, block))
 
     def ports(self, block: str) -> dict[str, dict[str, str]]:
-        """What the blocks of one kind are connected to, given in the file or by default.
+        """Connections of the blocks of one kind, given in the file or by default.
 
         Parameters
         ----------
@@ -211,11 +211,11 @@ class Rig(View):
 
     @property
     def cautions(self) -> list[str]:
-        """What of the rig is possible, and most likely a mistake, one sentence each: chambers that
-        no air reaches, valves that never pass air, delays as long as the period of the pulses,
-        muscles that push more than rubber bears, of which nobody says what they bear without air,
-        that are too long or short for their joint, or whose largest pressure nobody says, friction
-        of exactly nothing, measured values without a tolerance. Empty where nothing is.
+        """Cautions about parts of the rig that are possible and most likely mistakes, one sentence
+        each: chambers that no air reaches, valves that never pass air, delays as long as the period
+        of the pulses, muscles that push more than rubber bears, whose ``buckling_load`` is missing,
+        that are too long or short for their joint, or without a largest pressure, friction of
+        exactly zero, measured values without a tolerance. Empty where there are none.
         """
         return cautions_of(self._model, self._connected, self._known, self.units, self._text)
 
@@ -248,7 +248,7 @@ class Rig(View):
 
     @property
     def model_error(self) -> dict[str, dict[str, float]]:
-        """How well the model is known, from ``[model_error]``: name of a kind of block or of a
+        """Stated error of the model, from ``[model_error]``: name of a kind of block or of a
         channel -> ``{"share": number}`` or ``{"size": SI value}``, one standard deviation each.
         """
         stated: dict[str, dict[str, float]] = copy.deepcopy(self._model.get("model_error") or {})
@@ -263,7 +263,7 @@ class Rig(View):
 
     @property
     def limits(self) -> dict[str, Any]:
-        """What the bench allows, where the file says it (a copy): ``max_pressure`` [Pa, gauge] and
+        """Limits of the bench, where the file has them (a copy): ``max_pressure`` [Pa, gauge] and
         ``payloads`` [kg], for experiments that are proposed.
         """
         return copy.deepcopy(self._model.get("limits", {}))
@@ -368,9 +368,7 @@ class Rig(View):
                         yield f"{qualified(block, name)}.{key.name}", key
 
     def _scalar(self, model: dict[str, Any], dotted: str) -> tuple[dict[str, Any], Key]:
-        """The table in which ``model`` has a scalar, and what is known of it; the model is of the
-        form of this rig's own.
-        """
+        """Table of ``model``, of this rig's form, that holds a scalar, and the scalar's key."""
         block, name, own = split_name(dotted)
         table = tables_of(model, block).get(name, {}) if block in BLOCKS else {}
         key = next((key for key in BLOCKS.get(block, ()) if key.name == own and own in table), None)
@@ -425,7 +423,7 @@ class Rig(View):
 
     @staticmethod
     def _is_count(dotted: str) -> bool:
-        """Whether a dotted name is that of a count."""
+        """True where a dotted name is that of a count."""
         block, _, own = split_name(dotted)
         return any(key.kind == "count" for key in BLOCKS.get(block, ()) if key.name == own)
 
@@ -433,13 +431,13 @@ class Rig(View):
     # numbers.
 
     def _with_origin(self, base: Rig, values: Mapping[str, float]) -> Rig:
-        """Note that this rig is another one with other numbers."""
+        """Note the rig that this one differs from by numbers alone, and these numbers."""
         origin, before = base.__dict__.get("_origin", (base, {}))
         object.__setattr__(self, "_origin", (origin, {**before, **values}))
         return self
 
     def _with_entry(self, entry: Entry, std: dict[str, dict[str, float]]) -> Rig:
-        """The same rig with one effect more, as an entry of its model."""
+        """Copy of the rig with one effect more, given as an entry of its model."""
         before: list[Entry] = self._model["effects"]
         entries = placed(before, entry)
         full = full_name(entry)
@@ -456,7 +454,7 @@ class Rig(View):
         return found._with_origin(self, own) if same else found
 
     def with_case(self, folder: str) -> Rig:
-        """The same rig with a note of the case that it was diagnosed from.
+        """Copy of the rig with a note of the case that it was diagnosed from.
 
         Parameters
         ----------
@@ -473,7 +471,7 @@ class Rig(View):
         return replace(self, _model=model)
 
     def _grown_by(self, entry: Entry) -> tuple[Rig, dict[str, float]]:
-        """The rig that this one differs from by numbers with an effect more, and these numbers."""
+        """Origin of this rig with an effect more, kept for reuse, and the numbers that differ."""
         origin, before = self.__dict__.get("_origin", (self, {}))
         grown: dict[tuple[str, str, str], Rig] = origin.__dict__.get("_grown", {})
         kind = kind_of_entry(entry)
@@ -621,9 +619,7 @@ class Rig(View):
 
 
 def _with_its_keys(dotted: str, table: dict[str, Any]) -> set[str]:
-    """Give the table of a count what needs it, at its default, or take it away; dotted names of
-    what has gone.
-    """
+    """Add the keys that a count needs, at their defaults, or remove them; return the removed."""
     block, name, count = split_name(dotted)
     has, gone = keys_of(block, table), set()
     for key in (key for key in BLOCKS[block] if key.needs == count):
@@ -635,9 +631,7 @@ def _with_its_keys(dotted: str, table: dict[str, Any]) -> set[str]:
 
 
 def _opened(model: dict[str, Any], tables: set[tuple[str, str]]) -> dict[str, Any]:
-    """A model with copies of some of its tables, by block and name; what is not changed is
-    shared.
-    """
+    """Model with copies of some of its tables, by block and name; the others are shared."""
     opened = dict(model)
     for block, name in tables:
         content: Any = opened.get(block)

@@ -21,9 +21,7 @@ Entry = dict[str, Any]
 def new_entry(
     model: Mapping[str, Any], effect: Any, parameters: Any, std: Any, at: Any, form: Any
 ) -> tuple[Entry, dict[str, float]]:
-    """An effect as :meth:`pamrs.Rig.with_effect` is asked for it, and what is known of its
-    parameters.
-    """
+    """Entry of an effect from arguments of :meth:`pamrs.Rig.with_effect`, and its deviations."""
     from pamrs.effects import CATALOGUE, EFFECTS
 
     if not isinstance(effect, str) or effect not in EFFECTS:
@@ -59,9 +57,7 @@ def new_entry(
 def _checked(
     given: Mapping[str, Any], ranges: Mapping[str, tuple[str, float, float, str]]
 ) -> tuple[dict[str, float], list[str]]:
-    """Numbers that are given, and what is wrong with them; of each its name in messages, its bounds
-    and its unit.
-    """
+    """Checked numbers of those given, and problems; `ranges` has label, bounds and unit of each."""
     chosen, problems = {}, []
     for name, (label, low, high, unit) in ranges.items():
         try:
@@ -73,7 +69,7 @@ def _checked(
 
 
 def kind_of_entry(entry: Mapping[str, Any]) -> tuple[str, str, str]:
-    """What an effect is beside its numbers."""
+    """Id, block and form of an effect: everything but its numbers."""
     return entry["id"], entry.get("at", ""), entry.get("form", "")
 
 
@@ -118,7 +114,7 @@ def block_name(block: str, at: Any) -> str:
 
 
 def full_name(entry: Entry) -> str:
-    """What an effect is called in full, ``leak_muscle.flexor``."""
+    """Full name of an effect, ``leak_muscle.flexor``."""
     return qualified(entry["id"], entry.get("at", ""))
 
 
@@ -133,7 +129,7 @@ def named_entries(rig: Rig) -> Iterator[tuple[str, Entry]]:
 
 
 def effect_parameter(rig: Rig, name: str) -> tuple[str, str, Entry] | None:
-    """What a dotted name says of an effect that a rig holds, None where it says nothing of one: the
+    """Effect and parameter that a dotted name means, None where it is no effect of the rig: the
     name of :func:`named_entries`, the parameter, and the effect. The block may be given where the
     effect is the only one of its id as well.
     """

@@ -93,7 +93,7 @@ class Units:
         return with_unit(f"{from_si(value, unit, si):{digits}}{spread}", unit)
 
     def retold(self, refusal: str, known: Mapping[str, str]) -> str:
-        """What the core says of a value, in the unit of the file.
+        """Message of the core with the value and its bounds in the unit of the file.
 
         Parameters
         ----------

@@ -235,22 +235,22 @@ def _line(name: str, table: Mapping[str, Any], ports: Ports) -> dict[str, Any]:
 
 
 def _gauged(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A supply or a line; the core takes the zero of its gauge as none where it is not told."""
+    """Supply or line without a ``pressure_zero`` of zero, which is the core's default."""
     return {key: value for key, value in table.items() if key != "pressure_zero" or value != 0.0}
 
 
 def _unusual(table: Mapping[str, Any], **usual: str) -> dict[str, Any]:
-    """A table without the choices that the core takes where none is given."""
+    """Table without the choices that are the core's defaults."""
     return {key: value for key, value in table.items() if usual.get(key) != value}
 
 
 def _nonzero(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    """What is not zero: the core takes what it is not told as zero."""
+    """Entries that are not zero; the core takes zero for those that it is not given."""
     return {name: table[name] for name in names if table.get(name, 0.0) != 0.0}
 
 
 def _transmission(table: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """How a muscle pulls on its joint; None where it is the joint's own way."""
+    """Geometry by which a muscle pulls on its joint; None where it is the joint's own."""
     if table is None:
         return None
     return {key: value for key, value in table.items() if key not in (*STOPS, *SPRING)}

@@ -205,12 +205,12 @@ def keys_of(block: str, content: Mapping[str, Any]) -> tuple[Key, ...]:
 
 
 def of_kind(block: str, content: Mapping[str, Any], key: Key) -> bool:
-    """Whether blocks of the kind of this one can have a key."""
+    """True where blocks of the kind of this one can have a key."""
     return not key.only or kind_for(block, content, key) in key.only
 
 
 def _none(count: Any) -> bool:
-    """Whether a count is 0 or left out, in a file or in a model."""
+    """True where a count is 0 or left out, in a file or in a model."""
     number = count.get("value") if isinstance(count, Mapping) else count
     return number is None or (isinstance(number, (int, float)) and number == 0)
 
@@ -230,7 +230,7 @@ def kind_of(block: str, content: Mapping[str, Any]) -> Any:
 
 
 def qualified(block: str, name: str) -> str:
-    """What a block is called in full: ``"valve"`` without a name, else ``"valve.flexor"``."""
+    """Full name of a block: ``"valve"`` without a name, else ``"valve.flexor"``."""
     return f"{block}.{name}" if name else block
 
 
