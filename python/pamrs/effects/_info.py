@@ -1,4 +1,4 @@
-"""What the catalogue knows of an effect and of its parameters."""
+"""Entries of the catalogue: an effect, its forms and its parameters."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class EffectParameter:
     needed_in: tuple[str, ...] = ()
 
     def role_in(self, *, sealed: bool) -> str:
-        """What it is to a fit, in a rig with a valve or in a sealed one; never empty."""
+        """Role in a fit, in a rig with a valve or in a sealed one; never empty."""
         if self.repeats:
             return "held"
         usual = self.role or ("size" if self.neutral == 0.0 else "shape")
@@ -100,8 +100,8 @@ class EffectParameter:
 
 @dataclass(frozen=True, slots=True)
 class SameData:
-    """When an effect leaves the very recordings that another one leaves: nothing in them can tell
-    the two apart.
+    """Condition under which an effect gives exactly the recordings of another one: nothing in them
+    can distinguish the two.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class ClosureTerm:
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """How a sum of terms is put into words.
+    """Words in which a sum of terms is described.
 
     Attributes
     ----------
@@ -199,19 +199,21 @@ class Form:
 
     @property
     def transient(self) -> bool:
-        """Whether it happens at times of its own, with a phase or with a size of its own in each
-        recording, so that all recordings cannot share its parameters.
+        """True where the form acts at times of its own, with a phase or with a size of its own in
+        each recording, so that all recordings cannot share its parameters.
         """
         return self.periodic or self.own or any(p.role == "time" for p in self.parameters)
 
     @property
     def own(self) -> bool:
-        """Whether it acts all the time with a size of its own in each recording."""
+        """True where the form acts all the time with a size of its own in each recording."""
         return any(parameter.own for parameter in self.parameters)
 
     @property
     def periodic(self) -> bool:
-        """Whether it repeats with a frequency; its phase is another one in each recording."""
+        """True where the form repeats with a frequency; its phase differs from recording to
+        recording.
+        """
         return any(p.scan is not None and p.unit == "Hz" for p in self.parameters)
 
     @property
@@ -222,7 +224,7 @@ class Form:
 
 @dataclass(frozen=True, slots=True)
 class BenchUnit:
-    """How a parameter is told on a bench.
+    """Unit in which a parameter is stated on a bench.
 
     Attributes
     ----------
@@ -378,21 +380,21 @@ class EffectInfo:
         return found
 
     def on_bench(self, parameter: str, form: str = "") -> BenchUnit | None:
-        """How a parameter of one of its forms is told on a bench; None for the usual unit."""
+        """Unit of a parameter of a form on a bench; None for the usual unit."""
         own = {u.form: u for u in self.bench_units if u.parameter == parameter}
         return own.get(form, own.get(""))
 
     @property
     def everywhere(self) -> str:
-        """Where it acts when no block is named, in words."""
+        """Words for the blocks on which the effect acts when none is named."""
         if not self.at:
             return "the whole rig"
         return f"the last {self.at}" if self.last_only else f"every {self.at}"
 
     @property
     def needs(self) -> tuple[tuple[str, str], ...]:
-        """What a rig must have for it: one of these blocks, each with its kind (empty: any); empty
-        for the usual.
+        """Blocks of which a rig must have one, each with its kind (empty: any); empty for the usual
+        one.
         """
         if self.on_loads:
             return (("load", "mass"), ("joint", ""))
@@ -404,7 +406,7 @@ class EffectInfo:
 
     @property
     def transient(self) -> bool:
-        """Whether its first form happens at times of its own in each recording."""
+        """True where the first form is transient; see :attr:`Form.transient`."""
         return self.forms[0].transient
 
     @property
@@ -414,7 +416,7 @@ class EffectInfo:
 
     @property
     def own(self) -> bool:
-        """Whether its first form has a size of its own in each recording."""
+        """True where the first form has a size of its own in each recording."""
         return self.forms[0].own
 
     @property

@@ -1,4 +1,4 @@
-"""What is said to be missing or wrong: terms, and hypotheses, which are sets of them.
+"""Terms, each something that may be missing or wrong, and hypotheses, which are sets of them.
 
 A term is an effect, at one block or at every one of its kind, or a value of the rig file. Results
 hold both as text: an effect at one block has the block's name behind an ``@``, the terms of a
@@ -76,27 +76,27 @@ class Term:
 
     @property
     def is_effect(self) -> bool:
-        """Whether it is an effect of the catalogue, or a closure."""
+        """True for an effect of the catalogue, or a closure."""
         return self.id in EFFECTS
 
     @property
     def is_value(self) -> bool:
-        """Whether it is a value of the rig file."""
+        """True for a value of the rig file."""
         return "." in self.id
 
     @property
     def info(self) -> EffectInfo:
-        """What is known of the effect; KeyError of a value."""
+        """Entry of the effect in the catalogue; KeyError for a value."""
         return EFFECTS[self.id]
 
     def own(self, values: Mapping[str, _Value]) -> dict[str, _Value]:
-        """What a table by dotted names has of the effect's parameters, by their short names."""
+        """Values of the effect's parameters by short name, out of a table by dotted names."""
         begin = f"{self}."
         return {n.removeprefix(begin): v for n, v in values.items() if n.startswith(begin)}
 
     def excluded_by(self, others: Iterable[Term]) -> bool:
-        """Whether it cannot act together with others: it is one of them, or of two terms of one
-        effect one acts everywhere.
+        """True where the term cannot act together with others: it is one of them, or both are of
+        one effect and one acts everywhere.
         """
         return any(
             self.id == other.id and (self == other or not self.at or not other.at)

@@ -79,7 +79,7 @@ def entry(effect: str) -> EffectInfo:
 
 
 def where(info: EffectInfo) -> str:
-    """Where an effect acts, and how one place of several is chosen."""
+    """Words for the place of an effect, and for choosing one block of several."""
     if not info.at:
         return info.everywhere
     return f"{info.everywhere}; with `at`, only the {info.at} of that name"

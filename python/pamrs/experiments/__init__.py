@@ -1,4 +1,4 @@
-"""What a person can record on a rig: standard experiments, each as the commands that are sent.
+"""Standard experiments that a person can record on a rig, each as the commands that are sent.
 
 Public: `library`, `experiments_of` (all that a rig can do; as high and as fast as was recorded);
 `Experiment`, `protocol_of` (one of them, and its commands as a file); `Chain`, `chains_of`,

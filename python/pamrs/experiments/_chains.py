@@ -55,8 +55,8 @@ class Range:
 
 @dataclass(frozen=True)
 class Chain:
-    """What one or several commands move: the air of one chamber, or that behind one regulator, or
-    that whose pressure a bench sets.
+    """Air that one or several commands move together: of one chamber, or behind one regulator, or
+    at a pressure that a bench sets.
 
     Attributes
     ----------
@@ -158,7 +158,9 @@ def joined(rig: Rig, node: str) -> list[str]:
 
 
 def _moved(rig: Rig, chambers: set[str]) -> tuple[str, ...]:
-    """Channels of what the muscles in some chambers move; nothing on a frame, which moves them."""
+    """Channels that the muscles of some chambers move; none on a frame, which prescribes the
+    length.
+    """
     if has_frame(rig):
         return ()
     ends = [e for e in rig.ports("muscle").values() if e["chamber"].partition(".")[2] in chambers]
@@ -171,12 +173,12 @@ def _moved(rig: Rig, chambers: set[str]) -> tuple[str, ...]:
 
 
 def is_sealed(rig: Rig) -> bool:
-    """Whether nobody sends a command to a rig: a chamber without a valve, a supply and a frame."""
+    """True where nobody sends a command to a rig: it has no valve, no supply and no frame."""
     return not (rig.tables("valve") or rig.tables("supply") or has_frame(rig))
 
 
 def can_shut(rig: Rig, chain: Chain) -> bool:
-    """Whether the valves of a chain can hold its air: a 3/2 valve that switches fills or vents."""
+    """True where a chain's valves can hold its air; a 3/2 valve that switches fills or vents."""
     tables = rig.tables("valve")
     closing = ("closed", "either")
     return bool(chain.valves) and all(
@@ -201,7 +203,7 @@ def driving(commands: Mapping[str, Array]) -> dict[str, Any]:
 
 
 class _Valve:
-    """A valve backwards: from the mass flow that is wanted in its chamber to its command."""
+    """Inverse of a valve: from the mass flow that is wanted in its chamber to its command."""
 
     def __init__(self, rig: Rig, name: str) -> None:
         gas, table = rig.tables("gas")[""], rig.tables("valve")[name]
@@ -247,8 +249,8 @@ class _Valve:
         )
 
     def _duty(self, mass: float, inside: float, supply: float) -> float:
-        """The duty of a valve that switches, as a command, its delays made good; without a carrier
-        full or none, so that their mean is the duty.
+        """Command for a duty of a switching valve, its delays made up for; without a carrier fully
+        on or off, so that the mean is the duty.
         """
         of = {
             "fill": self.fills * self._flow(supply, inside),
@@ -328,7 +330,7 @@ def _valve_commands(
 def commands_for(
     rig: Rig, references: Mapping[str, Array], *, length: Array | None = None, **options: Any
 ) -> dict[str, Array]:
-    """What is sent to a rig so that the pressures of its chains follow references.
+    """Commands with which the pressures of a rig's chains follow references.
 
     Parameters
     ----------
@@ -358,8 +360,8 @@ def commands_for(
 
 
 def _source(rig: Rig, chain: Chain) -> float:
-    """Highest pressure that the supply of a chain gives [Pa, gauge]: what it begins with; that of
-    its chamber where no supply stands in front of it.
+    """Highest pressure that the supply of a chain can give [Pa, gauge]: its initial one, at most
+    that of its inlet; the chamber's own where it has no supply.
     """
     ways = [*rig.ports("valve").values(), *rig.ports("line").values()]
     found = [qualified("chamber", chain.chamber)]
@@ -379,7 +381,7 @@ def _source(rig: Rig, chain: Chain) -> float:
 
 
 def _inlets(rig: Rig) -> dict[str, float]:
-    """Pressure in front of each regulator that has a supply there as it begins [Pa, gauge]."""
+    """Initial pressure of the supply before each regulator that has one [Pa, gauge]."""
     tables = rig.tables("supply")
     return {
         name: float(tables[ports["inlet"].partition(".")[2]]["initial_pressure"])
@@ -391,7 +393,7 @@ def _inlets(rig: Rig) -> dict[str, float]:
 def _most(
     rig: Rig, chain: Chain | None, highest: float | Mapping[str, float] | None
 ) -> list[float]:
-    """What is known of the highest pressure that is allowed [Pa, gauge]."""
+    """Upper bounds of a chain's pressure [Pa, gauge]: the given one, that of ``[limits]``."""
     if isinstance(highest, Mapping):
         highest = highest.get("" if chain is None else chain.name)
     said = [p for p in (highest, rig.limits.get("max_pressure")) if p is not None]
@@ -487,7 +489,7 @@ def pressure_range(rig: Rig, *, highest: float | Mapping[str, float] | None = No
 
 
 def _played(rig: Rig, references: Mapping[str, Array]) -> Simulation:
-    """A rig whose chains follow pressures at 100 Hz, regulators by being set to them."""
+    """Simulation of a rig at 100 Hz whose chains follow pressures."""
     try:
         commands = commands_for(rig, references, sample_time=0.01)
         return simulate(rig, sample_time=0.01, **driving(commands))
@@ -499,9 +501,7 @@ def _played(rig: Rig, references: Mapping[str, Array]) -> Simulation:
 
 
 def _share(rig: Rig, channel: str, found: Simulation) -> Array:
-    """Where a joint is between its rest and its upper stop, or a load between its longest and its
-    shortest.
-    """
+    """Position of a joint, rest (0) to upper stop (1), or of a load, longest to shortest."""
     if channel == "length":
         return np.asarray(
             (found["length"][0] - found["length"])
@@ -573,8 +573,8 @@ def spans_of(rig: Rig, *, highest: float | Mapping[str, float] | None = None) ->
 def _free(
     rig: Rig, chain: Chain, chains: Sequence[Chain], found: Simulation, top: float, first: int = 0
 ) -> Range:
-    """The pressures of a chain, as it rises, at which nothing that some chains move is at a stop;
-    all of them where something always is.
+    """Pressures of a rising chain at which no joint or load that it moves is at a stop; a usual
+    range where there are none.
     """
     moved = dict.fromkeys(m for c in chains for m in c.moves if set(c.moves) & set(chain.moves))
     free = np.ones(found.time.size, dtype=bool)

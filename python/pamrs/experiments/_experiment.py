@@ -77,7 +77,7 @@ class Experiment:
 
     @property
     def commands(self) -> dict[str, Array]:
-        """What is sent, by channel [SI]; empty where everything is done by hand."""
+        """Commands by channel [SI]; empty where everything is done by hand."""
         return {} if self.command is None else {self.channel: self.command, **self.also}
 
     @property
@@ -104,7 +104,7 @@ class Experiment:
 
 
 class Told(Formatter):
-    """What is said of experiments, in the units of a rig's file.
+    """Formatter of the texts of experiments, in the units of a rig's file.
 
     Numbers that a text marks ``{level:bar}``, ``{length:mm.3g}``, are in that unit, and told in the
     one of the rig, which ``{bar}`` stands for: as fine as hundredths of a bar and tenths of a
@@ -145,9 +145,7 @@ def protocol_of(experiment: Experiment) -> Protocol | None:
 
 
 def limited(values: Array, most: float) -> Array:
-    """A signal (n,) that follows another one, from one sample to the next by no more than so
-    much.
-    """
+    """Follow a signal (n,) by steps of at most so much from one sample to the next."""
     if values.size < 2 or float(np.abs(np.diff(values)).max()) <= most * (1.0 + 1e-9):
         return values
     out = np.empty_like(values)
@@ -158,18 +156,18 @@ def limited(values: Array, most: float) -> Array:
 
 
 def in_bar(pressure: float) -> float:
-    """A pressure as it is said: in hundredths of a bar."""
+    """Convert a pressure [Pa] to bar, rounded to hundredths."""
     return round(pressure * 1e-5, 2)
 
 
 def in_mm(length: float) -> float:
-    """A length as it is said: in tenths of a millimetre."""
+    """Convert a length [m] to millimetres, rounded to tenths."""
     return round(length * 1e3, 1)
 
 
 def other_payload(rig: Rig) -> tuple[str, float, str] | None:
-    """Another payload that a person may hang on: the parameter, its value [kg], and what it takes
-    that the rig file does not list; None where there is none.
+    """Another payload for the rig: the parameter, its value [kg], and words on what to get where
+    the rig file lists none; None where no other is possible.
     """
     if has_frame(rig):
         return None

@@ -1,5 +1,5 @@
-"""What a load frame may be asked to do: between which lengths and how fast it moves the muscle's
-end, at which length it holds it, and between which pressures the muscle then pulls.
+"""Range of a load frame in experiments: the lengths and the rate of the muscle's end, the length
+that is held, and the pressures at which the muscle then pulls.
 
 Lengths and pressures stay within what recordings showed, or, before there are any, where the muscle
 need not push; rates within what recordings showed or a plain testing machine can do, whichever is
@@ -32,7 +32,7 @@ _HELD_SHARE = 0.7
 
 
 class Rates(Protocol):
-    """How fast a plain testing machine moves.
+    """Rates of a plain testing machine.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Rates(Protocol):
 
 @dataclass(frozen=True)
 class Seen:
-    """What recordings showed a bench to do.
+    """Range and rates of a bench that its recordings show.
 
     Attributes
     ----------
@@ -72,7 +72,8 @@ class Seen:
 
 
 def seen_in(rig: Rig, records: Sequence[Recording], window: float) -> Seen | None:
-    """What recordings of a rig with a frame showed; None where none has a usable length.
+    """Range and rates that the recordings of a rig with a frame show; None where none has a usable
+    length.
 
     Parameters
     ----------
@@ -109,7 +110,7 @@ def _usable(record: Recording, name: str) -> Array:
 
 
 def _fastest(values: Array, step: int, sample_time: float) -> float:
-    """Largest change of a signal over so many samples, as a rate, but for one in two hundred."""
+    """Rate of change of a signal over so many samples that 99.5 % of its changes stay below."""
     moved = np.abs(values[step:] - values[:-step])
     if not np.isfinite(moved).any():
         return 0.0
@@ -118,7 +119,7 @@ def _fastest(values: Array, step: int, sample_time: float) -> float:
 
 @dataclass(frozen=True)
 class Frame:
-    """What a load frame may be asked to do.
+    """Range of a load frame within which experiments stay.
 
     Attributes
     ----------
@@ -161,7 +162,7 @@ def frame_of(
     highest: float | Mapping[str, float] | None = None,
     seen: Seen | None = None,
 ) -> Frame:
-    """What the load frame of a rig may be asked to do.
+    """Range of the load frame of a rig for experiments.
 
     The longest length is the longest that was recorded, else that of the muscle at rest; the
     shortest is where the muscle hardly pulls any more at half of its highest pressure, or, with
@@ -216,9 +217,7 @@ def frame_of(
 
 
 def _shortest(rig: Rig, pressures: Mapping[str, float], lengths: Range, pulling: float) -> float:
-    """The shortest length from which on to the longest one the muscles pull [m]: by a share of what
-    they pull at the longest.
-    """
+    """Shortest length [m] to which, from the longest on, the muscles keep a share of their pull."""
     tried = np.linspace(lengths.high, lengths.low, 41)
     least = pulling * _pull(rig, pressures, lengths.high)
     found = float(tried[0])
@@ -232,9 +231,7 @@ def _shortest(rig: Rig, pressures: Mapping[str, float], lengths: Range, pulling:
 def _lowest(
     rig: Rig, chains: Iterable[Chain], tops: Mapping[str, float], length: float, pulling: float
 ) -> float:
-    """The lowest share of their highest pressures, from a tenth to a half, at which the muscles
-    pull: by a share of what they pull at the highest.
-    """
+    """Lowest share of the highest pressures, 0.1 to 0.5, at which the muscles pull enough."""
 
     def pull(share: float) -> float:
         return _pull(rig, {c.chamber: share * tops[c.name] for c in chains}, length)

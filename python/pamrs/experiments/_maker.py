@@ -80,14 +80,14 @@ def _legs(row: Row, periods: Sequence[float]) -> Legs:
 
 
 def _course(legs: Legs, begin: float, span: Range, sample_time: float) -> Array:
-    """What follows legs from a value on (n,), in the unit of the range."""
+    """Straight lines (n,) from a value through the ends of legs, in the unit of the range."""
     ends = np.cumsum([0.0, *(seconds for seconds, _ in legs)])
     time = np.arange(round(float(ends[-1]) / sample_time) + 1) * sample_time
     return np.asarray(np.interp(time, ends, [begin, *(span.at(share) for _, share in legs)]))
 
 
 def _shut(row: Row, rows: int, sample_time: float) -> Mask:
-    """At which of so many samples valves are shut: in the last leg of each level of a row."""
+    """Samples in which valves are shut: those of the last leg of each level of a row."""
     legs = _legs({**row, "cycles": ()}, ())
     ends = np.cumsum([0.0, *(seconds for seconds, _ in legs)])
     time, each = np.arange(rows) * sample_time, len(row["each"])
@@ -97,8 +97,8 @@ def _shut(row: Row, rows: int, sample_time: float) -> Mask:
 
 
 def _wave(frequencies: Array, time: Array, turned: float = 0.0) -> Array:
-    """A sum of sines (n,) between -1 and 1 that grow smaller above 0.6 Hz, their phases by
-    Schroeder's rule and turned by an angle [rad], so that its peaks are low.
+    """Sum of sines (n,) with peaks at 1 in magnitude, smaller above 0.6 Hz; Schroeder's phases,
+    which keep the peaks low, plus an angle [rad].
     """
     count = frequencies.size
     size = 1.0 / np.sqrt(1.0 + (frequencies / 0.6) ** 2)
@@ -109,14 +109,14 @@ def _wave(frequencies: Array, time: Array, turned: float = 0.0) -> Array:
 
 
 def _rounded(frequencies: Array) -> list[float]:
-    """Frequencies as they are said [Hz]."""
+    """Frequencies rounded as texts have them [Hz]."""
     return [round(float(f), 3) for f in frequencies]
 
 
 def _rounded_levels(
     row: Row, span: Range, rounded: Callable[[float], float], told: Told
 ) -> dict[str, Any]:
-    """Levels of a row and reaches around them, as they are said."""
+    """Levels of a row and reaches around them, rounded as texts have them."""
     level = [rounded(span.at(share)) for share in row.get("told", row.get("levels", ()))]
     step = row.get("step", 0.0) * (span.high - span.low) * 1e-5
     return {
@@ -155,12 +155,12 @@ class Maker:
 
     @cached_property
     def told(self) -> Told:
-        """What texts say, in the units of the rig's file."""
+        """Formatter of texts in the units of the rig's file."""
         return Told(self.rig)
 
     @cached_property
     def spans(self) -> Spans:
-        """Between which pressures the chains move; found with the first experiment."""
+        """Ranges of the chains' pressures; found with the first experiment."""
         if self.frame is not None:
             return self.frame.spans
         if len(self.chains) > 1:
@@ -168,7 +168,7 @@ class Maker:
         return Spans({}, {"": pressure_range(self.rig, highest=self.highest)})
 
     def makers(self) -> Iterator[tuple[str, Callable[[], Experiment | None]]]:
-        """What makes each experiment that the rig can do, with its name."""
+        """Name of each experiment that the rig can do, with the function that makes it."""
         several = len(self.chains) > 1
         for row in rows("protocol"):
             build = getattr(self, f"_{row['build']}") if "build" in row else self._one
@@ -184,7 +184,7 @@ class Maker:
                     yield row["name"], partial(build, row, self.chains[0])
 
     def _can(self, row: Row, chains: Sequence[Chain]) -> bool:
-        """Whether the rig, or some of its chains, have what a row asks for."""
+        """True where the rig, or some of its chains, meet the conditions ``when`` of a row."""
         rig, (chain, *_) = self.rig, chains
         shut = all(can_shut(rig, one) for one in chains)
         has = {
@@ -200,7 +200,7 @@ class Maker:
 
     @property
     def given(self) -> bool:
-        """Whether pressures are set by a bench that the rig does not describe."""
+        """True where pressures are set by a bench that the rig does not describe."""
         return not (self.chains[0].regulator is not None or self.chains[0].valves)
 
     def _begin(self, chain: Chain) -> float:
@@ -208,16 +208,16 @@ class Maker:
         return chain.before(self.rig) if len(self.chains) > 1 else 0.0
 
     def _period(self, seconds: float, rise: float) -> float:
-        """Period of a triangle over so much pressure [Pa]: so many seconds, or longer where a bench
-        cannot set pressures so fast.
+        """Period [s] of a triangle over a change of pressure [Pa], longer where the bench is too
+        slow.
         """
         if self.frame is None or not self.given:
             return seconds
         return max(seconds, round(2.02 * rise / self.frame.pressure_rate, 1))
 
     def _reach(self, chain: Chain) -> Range:
-        """Pressures of a chain while all others move as well: of its own range the share that
-        leaves the others theirs.
+        """Range of a chain's pressure while all chains move: its own range, narrowed by the square
+        root of their number.
         """
         own, several = self.spans.alone[chain.name], len(self.chains) > 1
         held = self.spans.held[chain.name] if several else own.at(0.5)
@@ -226,7 +226,7 @@ class Maker:
         return Range(middle - half, middle + half)
 
     def _facts(self, row: Row, chain: Chain) -> dict[str, Any]:
-        """What texts and numbers of any row may say."""
+        """Values that the texts and numbers of any row may use, by name."""
         kind = "set pressure" if chain.regulator is not None else "pressure"
         one = "the muscle pressure" if chain.regulator is None else "the regulator's set pressure"
         many = len(chain.valves) > 1
@@ -307,9 +307,7 @@ class Maker:
     def _reachable(
         self, frame: Frame, references: Mapping[str, Array]
     ) -> tuple[dict[str, Array], str]:
-        """References that begin where a muscle pulls and rise and fall as fast as a bench can set
-        pressures, and what to say of that.
-        """
+        """References clipped to each chain's range and to the bench's rate, and words on that."""
         found, slower = {}, False
         for name, values in references.items():
             span: Range = frame.spans.alone[name]
@@ -377,7 +375,7 @@ class Maker:
         return self._driven(row, facts, references)
 
     def _levels(self) -> dict[str, Any]:
-        """Between which pressures all chains move, in words and numbers."""
+        """Ranges of the pressures of all chains, in words and in bar."""
         spans = {c.name: self._reach(c) for c in self.chains}
         levels = {n: [in_bar(s.low), in_bar(s.high)] for n, s in spans.items()}
         words = [f"{n} between {self.told.each(ends, 'bar')}" for n, ends in levels.items()]
@@ -429,9 +427,7 @@ class Maker:
         return self._one(row, chain, dither=dither, facts=facts)
 
     def _both_sides(self, row: Row, chain: Chain) -> Experiment | None:
-        """Holds above and below the pressure at which equal leaks from the supply and to the
-        ambient balance.
-        """
+        """Experiment that holds pressures above and below those where equal leaks balance."""
         ambient, span = self.rig.tables("gas")[""]["ambient_pressure"], self.spans.alone[""]
         (fed,) = {self.rig.ports("valve")[name]["from"] for name in chain.valves}
         kind, _, place = fed.partition(".")
@@ -587,9 +583,8 @@ def _up(seconds: float) -> float:
 
 
 def _shares(row: Row, count: int) -> Sequence[float]:
-    """Shares of their ranges at which so many chains rest: as many as give each an order of its
-    own, two for each share (:func:`_turned`); up and down again where a row is mirrored, which
-    gives one order for each.
+    """Shares of their ranges at which so many chains rest: enough for an order of its own for each,
+    two for each share (:func:`_turned`), or one where the row is mirrored.
     """
     if count <= 6:
         levels: Sequence[float] = row["levels"]
@@ -601,9 +596,7 @@ def _shares(row: Row, count: int) -> Sequence[float]:
 
 
 def _turned(shares: Sequence[float], k: int) -> Sequence[float]:
-    """Shares in the order of the k-th chain: begun at another one, those of every second chain
-    mirrored.
-    """
+    """Shares in the order of the k-th chain: rotated, and mirrored for every second chain."""
     at = (k // 2) % len(shares)
     turned = [*shares[at:], *shares[:at]]
     return [1.0 - share for share in turned] if k % 2 else turned

@@ -37,9 +37,7 @@ _MOST_BLOWN_SAMPLES = 3000
 
 
 def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experiment]:
-    """Fills of all chambers, shut off and left alone; where lines join several chambers, also of
-    one, which then blows over into the others.
-    """
+    """Experiments of sealed chambers: all filled and left alone; of joined ones, also one alone."""
     chambers, told = list(rig.tables("chamber")), Told(rig)
     segments = any(line.get("segments") for line in rig.tables("line").values())
     outlets = any(ends["to"] == "ambient" for ends in rig.ports("line").values())
@@ -76,8 +74,8 @@ def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experimen
 
 
 def _equalised(rig: Rig, begin: dict[str, float], joining: Collection[str]) -> float:
-    """Three times as long as chambers that lines join take to come within a hundredth of each other
-    [s], from 1 s to 60 s.
+    """Time [s], 1 to 60, in which joined chambers equalise: three times that to within a hundredth
+    of the first difference.
     """
     found = simulate(rig, sample_time=_SAMPLE_TIME, duration=20.0, initial=begin)
     each = np.array([found[dotted("muscle_pressure", name)] for name in joining])
@@ -89,7 +87,7 @@ def _equalised(rig: Rig, begin: dict[str, float], joining: Collection[str]) -> f
 def _left_alone(
     name: str, text: str, begin: dict[str, float], seconds: float, sample_time: float
 ) -> Experiment:
-    """Some pressures to begin with, and nothing that is sent."""
+    """Experiment without commands that begins at some pressures."""
     excitation = {
         "kind": name,
         "levels_bar": sorted({in_bar(pressure) for pressure in begin.values()}),
@@ -211,8 +209,8 @@ def experiments_of(
 
 
 def _exceeds(experiment: Experiment, rig: Rig) -> bool:
-    """Whether an experiment goes beyond the pressure that the rig file says the stand allows: what
-    a command is found for is overshot where the valve is far open.
+    """True where an experiment, simulated, exceeds the largest pressure of ``[limits]``: commands
+    overshoot where the valve is far open.
     """
     most = rig.limits.get("max_pressure")
     if most is None:

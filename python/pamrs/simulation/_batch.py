@@ -52,8 +52,8 @@ class Failure(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BatchRun(View, Tabular, Mapping[str, Array]):
-    """What :meth:`Batch.control` or :func:`pamrs.simulate_batch` recorded; ``run["joint_angle"]``
-    has the shape (n, rows).
+    """Record of :meth:`Batch.control` or :func:`pamrs.simulate_batch`; ``run["joint_angle"]`` has
+    the shape (n, rows).
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class BatchRun(View, Tabular, Mapping[str, Array]):
 
     @property
     def failed(self) -> Mask:
-        """Which plants ended, shape (n,)."""
+        """True for each plant that ended early, shape (n,)."""
         return np.array([failure is not None for failure in self.status], dtype=np.bool_)
 
     def _columns(self) -> Columns:
@@ -135,7 +135,7 @@ class BatchRun(View, Tabular, Mapping[str, Array]):
 
 
 def _draw_spread(axes: Any, name: str, of: Array) -> None:
-    """How many plants have which number."""
+    """Draw a histogram of a number over the plants."""
     axes.hist(of[np.isfinite(of)], bins="auto", color=COLOURS[0])
     axes.set_xlabel(name)
     axes.set_ylabel("plants")
@@ -222,9 +222,7 @@ class Batch:
         self._begin(self._starting(initial))
 
     def _begin(self, initial: dict[str, Array]) -> None:
-        """A core for initial values, and its first state, to begin again from without new
-        threads.
-        """
+        """Core for initial values, and its first state, to begin again without new threads."""
         self._initial = initial
         self._core = self._started(initial)
         self._first = self._core.states
@@ -271,8 +269,8 @@ class Batch:
 
     @property
     def state(self) -> dict[str, Any]:
-        """What everything to come depends on (copies): ``samples``, ``rows`` and ``status``; give
-        it back to :meth:`restore`.
+        """State that the further run depends on (copies): ``samples``, ``rows`` and ``status``;
+        give it back to :meth:`restore`.
         """
         return {"samples": self._core.samples, "rows": self._core.states, "status": self.status}
 
@@ -495,9 +493,7 @@ class Batch:
 
 
 class _Book(NamedTuple):
-    """What is recorded: arrays of shape (rows, n), so that what comes together is written
-    together.
-    """
+    """Records of a batch, of shape (rows, n): the values of one time are written together."""
 
     rows: dict[str, Array]
     every: int

@@ -1,4 +1,4 @@
-"""What drives a rig: commands and prescribed channels from a user's arguments to the names of the
+"""Inputs of a rig: commands and prescribed channels from a user's arguments to the names of the
 core, checked.
 """
 
@@ -86,7 +86,7 @@ def signals_of(
 
 
 class Inputs:
-    """What a rig takes, looked up once: for loops that ask at every sample.
+    """Signals that a rig takes, looked up once: for loops that ask at every sample.
 
     Parameters
     ----------
@@ -160,9 +160,7 @@ class Inputs:
         return numbers
 
     def rows(self, rows: int, asked: Mapping[str, Any]) -> dict[str, Array]:
-        """Commands of one sample of several plants, one number for each; whether the numbers are
-        possible is not looked at.
-        """
+        """Commands of one sample of several plants, one number for each; ranges are not checked."""
         given = self.named(asked).items()
         return {name: rowwise(name, values, rows, finite=False) for name, values in given}
 
@@ -183,7 +181,7 @@ class Inputs:
         return low, high, f"a number from {low:g} to {high:g} {unit}"
 
     def _check_prescribed(self, given: Mapping[str, ArrayLike]) -> None:
-        """What may be prescribed follows from the blocks."""
+        """Refuse prescribed channels that contradict the blocks, and a frame without a length."""
         if self._frame and "length" not in given:
             raise ParameterError("length is missing: a load frame needs one value per sample [m]")
         if not self._frame and "length" in given:
@@ -205,7 +203,7 @@ class Inputs:
 
 
 def inputs_of(rig: Rig) -> Inputs:
-    """What a rig takes, kept with it: a second run does not look it up again."""
+    """Inputs of a rig, kept with it: a second run does not look them up again."""
     cached: Inputs | None = rig.__dict__.get("_inputs")
     if cached is None:
         cached = Inputs(rig)
@@ -230,7 +228,7 @@ def initial_names(rig: Rig) -> list[str]:
 
 
 def _having(rig: Rig, state: str) -> list[str]:
-    """What of a rig has a state: names of blocks, behind that of a tube the number of a segment."""
+    """Names of the blocks that have a state; for a tube, with the number of the segment."""
     tables = rig.tables(_INITIAL[state])
     if state == "temperature":
         return [name for name, table in tables.items() if table["gas"] == "energy_balance"]
@@ -244,7 +242,9 @@ def _having(rig: Rig, state: str) -> list[str]:
 
 
 def keywords(answer: Any) -> dict[str, Any]:
-    """What a controller answers as keywords of :meth:`pamrs.Simulator.step`."""
+    """Keywords of :meth:`pamrs.Simulator.step` for a controller's answer; one command means the
+    valve.
+    """
     if isinstance(answer, Mapping) and any(name in SIGNALS for name in answer):
         return dict(answer)
     return {"valve_command": answer}
@@ -314,7 +314,7 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
 
 
 def has_frame(rig: Rig) -> bool:
-    """Whether a load frame prescribes the length."""
+    """True where a load frame prescribes the length."""
     return any(load["kind"] == "frame" for load in rig.tables("load").values())
 
 

@@ -54,7 +54,7 @@ def rowwise(name: str, values: ArrayLike, n: int, *, finite: bool = True) -> Arr
 
 
 def thread_count(threads: int | None) -> int:
-    """How many threads may work."""
+    """Number of threads that may work: the one given, else that of the processors."""
     if threads is None:
         if hasattr(os, "sched_getaffinity"):
             return min(len(os.sched_getaffinity(0)), _MOST_THREADS)

@@ -120,7 +120,7 @@ def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
 
 
 def reading(result: Simulation, channel: str) -> Array | None:
-    """What a sensor of a stand would read of a run.
+    """Values that a sensor of a stand would read in a run.
 
     Parameters
     ----------
@@ -171,15 +171,13 @@ def differences(result: Simulation, recording: Recording) -> dict[str, float]:
 
 
 def _usable(recording: Recording, channel: str, name: str = "") -> bool:
-    """Whether a recording has a usable sample of a block's channel."""
+    """True where a recording has a usable sample of a block's channel."""
     full = dotted(channel, name)
     return full in recording.channels and bool(recording.mask[full].any())
 
 
 def _held(recording: Recording, name: str) -> Array:
-    """A channel whose unusable samples repeat the last usable one, as a valve does that hears
-    nothing new.
-    """
+    """Channel whose unusable samples repeat the last usable one, as a valve holds its command."""
     if not _usable(recording, name):
         raise RecordingError(f"{recording.name}: no usable {name}, which the rig needs")
     rows = recording.mask[name]

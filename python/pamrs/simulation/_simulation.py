@@ -123,7 +123,7 @@ class Balance:
         return self.joint_work / self.energy if self.energy > 0.0 else math.nan
 
     def _made_by(self) -> str:
-        """What makes or loses mass, in words, and what would not."""
+        """Words on why mass appears or vanishes, and on the choice that would avoid it."""
         tubes = [name for name in self.laws if name.partition(".")[0] == "line"]
         reasons = []
         if len(tubes) < len(self.laws):
@@ -158,7 +158,7 @@ class Balance:
 
 
 class _Told(NamedTuple):
-    """Something that a block does at some times, as the recorded channels show."""
+    """Condition of a block that begins and ends at times, as the recorded channels show."""
 
     block: str
     kinds: tuple[str, str]
@@ -169,18 +169,18 @@ class _Told(NamedTuple):
     more: str
 
     def events(self) -> list[Event]:
-        """When it begins and ends."""
+        """Events of its beginnings and ends."""
         return [Event(time, self.kinds[k % 2], self.block) for k, time in enumerate(self.times)]
 
     def words(self) -> str:
-        """The same as one line."""
+        """One line with the block, the condition, its first stretch and the count of the others."""
         end = f"to {self.times[1]:.4g} s" if len(self.times) > 1 else "to the end"
         again = _again(-(-len(self.times) // 2))
         return f"{self.block}: {self.what} from {self.times[0]:.4g} s {end}{again}; {self.more}"
 
 
 def _again(count: int) -> str:
-    """How often something happened that was told once."""
+    """Words for the number of times that something happened, after the first was described."""
     return {1: "", 2: " and once more"}.get(count, f" and {count - 1} more times")
 
 
@@ -207,7 +207,7 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         return sorted([*self._happened, *seen], key=lambda event: event.time)
 
     def _clipped(self) -> list[_Told]:
-        """Commands that may be beyond the range of their valve at some time."""
+        """Commands beyond their valve's range, an entry for each valve, perhaps without times."""
         found = []
         for name, command in self.under("valve_command").items():
             valve = self.rig.tables("valve")[name]
@@ -221,7 +221,7 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         return found
 
     def _happenings(self) -> list[_Told]:
-        """What the recorded channels show to have happened."""
+        """Conditions that the recorded channels show: clipped commands, muscles that push."""
         return [told for told in (*self._clipped(), *self._pushed()) if told.times]
 
     def _turns(self, of: Mask) -> list[float]:
@@ -229,7 +229,7 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         return [float(time) for time in self.time[np.flatnonzero(np.diff(of, prepend=False))]]
 
     def _pushed(self) -> list[_Told]:
-        """Muscles that may push at some time."""
+        """Muscles that push, an entry for each that can, perhaps without times."""
         found = []
         for name, muscle in self.rig.tables("muscle").items():
             load, force = muscle["buckling_load"], self.under("muscle_force").get(name)
@@ -331,8 +331,8 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         return total
 
     def _implied_in_lines(self, rt: float) -> float:
-        """The same along the lines [kg], `rt` being ``R T``: the inlet of one without segments is
-        isothermal, so that its mass is what its pressure says.
+        """Gain of mass along the lines by the gas law [kg], `rt` being ``R T``; the inlet of a line
+        without segments is isothermal, so that its recorded mass is the one by its pressure.
         """
         total = 0.0
         for line, table in self.rig.tables("line").items():
@@ -370,8 +370,8 @@ class Simulation(View, Tabular, Mapping[str, Array]):
             )
 
     def summary(self) -> str:
-        """Where every motion and pressure ends, what happened on the way, and what went where, in a
-        few lines.
+        """Summary in a few lines: the end of every motion and pressure, what happened on the way,
+        and where mass and energy went.
 
         Raises
         ------
@@ -473,9 +473,7 @@ def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
 
 
 def _revalued(rig: Rig, like: _core.Rig | None) -> _core.Rig | None:
-    """The compiled rig from which this one differs by numbers, with these; None where there is none
-    or it cannot be.
-    """
+    """Compiled rig of this one's origin with this one's numbers; None where that is impossible."""
     origin, values = rig.__dict__.get("_origin", (None, {}))
     if origin is None:
         return None

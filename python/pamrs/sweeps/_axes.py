@@ -1,5 +1,5 @@
-"""What varies from run to run: a grid over values, or a table of samples; and how its runs are cut
-into chunks.
+"""Axes of a sweep: a grid over values, or a table of samples; and the chunks into which its runs
+are cut.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Quantity(NamedTuple):
 
 
 def quantity(rig: Rig, name: str) -> Quantity:
-    """What a rig says of a number that is varied.
+    """Unit and bounds of a number of a rig that is varied.
 
     Parameters
     ----------
@@ -102,9 +102,7 @@ class Blocks(NamedTuple):
 
     @classmethod
     def cut(cls, shape: tuple[int, ...], chunk: int) -> Blocks:
-        """Chunks of at most ``chunk`` runs: whole trailing dimensions, and an even part of the one
-        before.
-        """
+        """Cut runs into chunks: whole trailing dimensions, and an even part of the one before."""
         block, inner = [1] * len(shape), 1
         for axis in range(len(shape) - 1, -1, -1):
             parts = math.ceil(shape[axis] / max(1, chunk // inner))
@@ -123,7 +121,7 @@ class Blocks(NamedTuple):
         return math.prod(self.counts)
 
     def region(self, chunk: int) -> tuple[slice, ...]:
-        """Where the runs of a chunk stand in the arrays."""
+        """Slices of the arrays that hold the runs of a chunk."""
         places = np.unravel_index(chunk, self.counts)
         return tuple(
             slice(int(k) * b, min((int(k) + 1) * b, n))
@@ -139,8 +137,8 @@ class Blocks(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """What varies from run to run: every combination of a grid, the last axis going fastest, or a
-    table of samples, run k in row k.
+    """Values of the numbers that vary from run to run: every combination of a grid, the last axis
+    going fastest, or a table of samples, run k in row k.
 
     Attributes
     ----------
@@ -155,7 +153,7 @@ class Axes:
 
     @classmethod
     def of(cls, over: Any, samples: ArrayLike | None = None) -> Axes:
-        """What a user varies; arguments and errors as of :func:`pamrs.sweep`."""
+        """Axes from a user's grid or samples; arguments and errors as of :func:`pamrs.sweep`."""
         if samples is not None:
             return cls(_table(over, samples), grid=False)
         if not isinstance(over, Mapping) or not over:
@@ -172,12 +170,12 @@ class Axes:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What varies."""
+        """Names of the numbers that vary."""
         return tuple(self.values)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the result."""
+        """Shape of the result."""
         sizes = tuple(column.size for column in self.values.values())
         return sizes if self.grid else sizes[:1]
 
@@ -199,7 +197,7 @@ class Axes:
         }
 
     def describe(self) -> dict[str, str]:
-        """What makes these runs these: name -> digest or words."""
+        """Entries of the plan that identify the axes: name -> digest or words."""
         kind = "values" if self.grid else "samples"
         order = {"order of the axes": ", ".join(self.names)} if self.grid else {}
         return order | {f"{kind} of {k}": f"{v.size}, {digest(v)}" for k, v in self.values.items()}
@@ -238,5 +236,5 @@ def _table(names: Any, samples: ArrayLike) -> dict[str, Array]:
 
 
 def digest(values: Array) -> str:
-    """What tells numbers from others, for a plan."""
+    """SHA-256 of numbers, by which a plan compares them."""
     return hashlib.sha256(np.ascontiguousarray(values).data).hexdigest()

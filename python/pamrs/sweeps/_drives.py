@@ -1,5 +1,5 @@
-"""What a chunk of runs is driven by, and how its numbers are worked out: the part of a sweep that a
-worker needs. All of it can be pickled.
+"""Drives of a sweep, which work out the numbers of a chunk of runs: the part that a worker needs.
+All of it can be pickled.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def metric_of(name: str, given: Any) -> Metric:
 
 
 class Done(NamedTuple):
-    """What came of a chunk.
+    """Result of a chunk.
 
     Attributes
     ----------
@@ -126,10 +126,10 @@ class Done(NamedTuple):
 
 
 class Drive(ABC):
-    """What runs are driven by; a subclass says how a group of runs of one rig is worked out."""
+    """Base of what drives the runs; a subclass works out a group of runs of one rig."""
 
     def quantity(self, rig: Rig, name: str) -> Quantity:
-        """What is known of a number that varies; errors as of :func:`quantity`."""
+        """Unit and bounds of a number that varies; errors as of :func:`quantity`."""
         return quantity(rig, name)
 
     @abstractmethod
@@ -138,19 +138,19 @@ class Drive(ABC):
 
     @abstractmethod
     def describe(self) -> dict[str, str]:
-        """What makes this drive this one: name -> digest or words."""
+        """Entries of the plan that identify this drive: name -> digest or words."""
 
     @abstractmethod
     def run(self, rig: Rig, n: int, values: Mapping[str, Array], threads: int | None) -> Done:
-        """The numbers of n runs of one rig, with values that need no other rig."""
+        """Work out the numbers of n runs of one rig, with values that need no other rig."""
 
     @abstractmethod
     def rig_names(self, rig: Rig, names: Iterable[str]) -> list[str]:
-        """Of the names that vary, those that need a rig of its own for each value."""
+        """Names, of those that vary, that need a rig of its own for each value."""
 
 
 def failed_rows(status: tuple[Any, ...]) -> tuple[Array, tuple[int, str] | None]:
-    """When rows ended [s], NaN for those that did not, and the first of them with its message."""
+    """Time at which each row ended early [s], NaN for others, and the first with its message."""
     times = np.array([np.nan if ended is None else ended.time for ended in status])
     first = next(((k, ended.message) for k, ended in enumerate(status) if ended is not None), None)
     return times, first
@@ -197,7 +197,7 @@ class OpenLoop(Drive):
         return [name for name in names if name not in quick and not name.startswith(INITIAL)]
 
     def _tanks(self, rig: Rig) -> dict[str, str]:
-        """Initial pressures of tanks in the rig, and what they are called as initial values."""
+        """Names of the tanks' parameters ``initial_pressure`` -> their names as initial values."""
         tanks = [name for name, table in rig.tables("supply").items() if table["kind"] == "tank"]
         return {
             f"{qualified('supply', name)}.initial_pressure": start

@@ -105,7 +105,7 @@ class ClosedLoop(Drive):
 
 
 def _name_of(controller: Any) -> str:
-    """What a controller is called, in every process the same."""
+    """Name of a controller, the same in every process."""
     if isinstance(controller, partial):
         fixed = [*map(repr, controller.args)]
         fixed += [f"{name}={value!r}" for name, value in sorted(controller.keywords.items())]

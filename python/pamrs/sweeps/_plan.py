@@ -23,7 +23,7 @@ _FEWEST, _MOST, _PARTS = 1024, 65_536, 64
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What is run, and how it is cut.
+    """Runs of a sweep, and how they are cut into chunks.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ _MOST_TOLD: Final = 4
 
 
 def differences(stored: dict[str, Any], wanted: dict[str, Any]) -> list[str]:
-    """What two plans do not have in common, in words that name the argument.
+    """Differences between two plans, in words that name the argument.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def differences(stored: dict[str, Any], wanted: dict[str, Any]) -> list[str]:
 
 
 def _argument(entry: str) -> str:
-    """The argument of a sweep that an entry of its plan is of."""
+    """Argument of a sweep to which an entry of its plan belongs."""
     for begin, called in _ARGUMENTS.items():
         if entry.startswith(begin):
             return called.format(entry.removeprefix(begin))
@@ -133,7 +133,7 @@ def _argument(entry: str) -> str:
 
 
 def _change(old: str, new: str) -> str:
-    """What an entry was and is; digests stand for numbers that are others."""
+    """Change of an entry in words; digests count as other numbers."""
     if _DIGEST.search(old) or _DIGEST.search(new):
         was, now = (re.sub(r"[ ,]*$", "", _DIGEST.sub("", text)) for text in (old, new))
         if was == now:
@@ -143,7 +143,7 @@ def _change(old: str, new: str) -> str:
 
 
 def _rigs(old: object, new: object) -> str:
-    """What two rigs, as TOML, do not have in common."""
+    """Differences between two rigs given as TOML, in words."""
     if not (isinstance(old, str) and isinstance(new, str)):
         return "another rig than that of the store"
     try:

@@ -51,7 +51,7 @@ def executor_of(given: Any) -> Executor | None:
 
 
 def in_flight_of(executor: Any) -> int:
-    """How many chunks are given to an executor at once."""
+    """Number of chunks that an executor gets at once."""
     workers = getattr(executor, "_max_workers", None)
     client = getattr(executor, "_client", None)
     if workers is None and client is not None:
@@ -172,7 +172,7 @@ class Progress:
             self._write(f"{self.line()}, going on", last=True)
 
     def add(self, runs: int, ended: int) -> None:
-        """A chunk more is done."""
+        """Count a chunk as done."""
         self._done += runs
         self._ended += ended
         self._chunks_done += 1
@@ -183,7 +183,7 @@ class Progress:
             self._write(self.line(), last=last)
 
     def line(self) -> str:
-        """How far it is, in one line."""
+        """Progress of the sweep in one line."""
         ended = f" ({self._ended} ended before their end)" if self._ended else ""
         said = (
             f"sweep {self._name}: {self._chunks_done} of {self._chunks} chunks, "
@@ -198,7 +198,7 @@ class Progress:
         return f"{said}, {duration_words(left)} left"
 
     def _left(self) -> float | None:
-        """How long it will go on [s]; None where nothing is done yet."""
+        """Remaining time [s], by the rate of the runs so far; None before the first."""
         passed, new = self._clock() - self._began, self._done - self._before
         return passed * (self._runs - self._done) / new if new and passed > 0.0 else None
 

@@ -149,9 +149,7 @@ class Store:
         return (chunk for chunk in range(len(self.plan.blocks)) if chunk not in self.entries)
 
     def write(self, chunk: int, values: Mapping[str, Array], done: Done) -> Entry:
-        """Keep a chunk with its values: its arrays to the disk first, then its line in the
-        journal.
-        """
+        """Keep a chunk: its arrays go to the disk first, then its line to the journal."""
         blocks, axes = self.plan.blocks, self.plan.axes
         region, (start, stop) = blocks.region(chunk), blocks.runs(chunk)
         shape = tuple(part.stop - part.start for part in region)
@@ -306,7 +304,7 @@ def _zarr() -> Any:
 
 @contextmanager
 def _opening(path: Path) -> Iterator[None]:
-    """A group that cannot be read is an error of the store."""
+    """Turn the errors of a group that cannot be read into one of the store."""
     try:
         yield
     except (OSError, KeyError, ValueError) as error:
@@ -316,7 +314,7 @@ def _opening(path: Path) -> Iterator[None]:
 
 
 def _locked(path: Path) -> int:
-    """A lock that ends with the process, whatever ends it."""
+    """Lock a file for this process; the lock ends with the process, even when it is killed."""
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         import fcntl
