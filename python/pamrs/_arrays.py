@@ -1,5 +1,5 @@
-"""Of arrays: their types by what they hold, stretches in which something holds, and solutions of
-normal equations, whatever scales their unknowns have.
+"""Types of arrays by what they hold, stretches of set flags, and solutions of normal equations with
+unknowns of any scale.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def solve_normal(normal: Array, right: Array) -> Array:
 
 
 def stretches(flags: Mask) -> list[tuple[int, int]]:
-    """Where a flag stays set.
+    """Stretches in which a flag stays set.
 
     Parameters
     ----------

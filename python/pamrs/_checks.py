@@ -24,7 +24,7 @@ _UNNOTICED_PRESSURE = 50.0  # [Pa] below which no muscle notices a pressure
 
 
 def as_said(value: object) -> str:
-    """A value as a message has it: a line of it at most, and no error of its own."""
+    """Value as a message prints it, on one line of limited length; never raises."""
     try:
         plain_scalar = type(value).__module__ == "numpy" and getattr(value, "shape", None) == ()
         text = repr(value.item() if plain_scalar else value)  # type: ignore[attr-defined]
@@ -34,7 +34,7 @@ def as_said(value: object) -> str:
 
 
 def refused(name: str, value: object, needed: str) -> ParameterError:
-    """The error for an argument: its name, what was given, and what is allowed."""
+    """Error for an argument: its name, the value given, and what is allowed."""
     return ParameterError(f"{name} = {as_said(value)} is not allowed: {needed}")
 
 
@@ -45,9 +45,7 @@ def check_kind(name: str, value: object, kind: type | tuple[type, ...], needed: 
 
 
 def check_names(what: str, names: Iterable[str], known: Iterable[str], kind: str) -> None:
-    """Refuse names that are none of those known; the error says of what kind they have to be, and
-    lists them.
-    """
+    """Refuse unknown names; the error says what kind is needed and lists the known ones."""
     there = list(known)
     for name in names:
         if name not in there:
@@ -56,7 +54,7 @@ def check_names(what: str, names: Iterable[str], known: Iterable[str], kind: str
 
 
 def as_column(name: str, values: Any) -> NDArray[np.float64]:
-    """An array of one dimension, with one number at least."""
+    """Check an array of one dimension with at least one number."""
     column = as_numbers(name, values).copy()
     if column.ndim != 1 or column.size == 0:
         raise misshapen(name, column.shape)
@@ -66,18 +64,14 @@ def as_column(name: str, values: Any) -> NDArray[np.float64]:
 def misshapen(
     name: str, shape: tuple[int, ...], rows: int | None = None, each: str = ""
 ) -> ParameterError:
-    """The error for an array that is no row of numbers: of how many, as many as it is long where
-    nothing else says it, and behind that what ``each`` of them is.
-    """
+    """Error for an array whose shape is not one row of ``each``, perhaps of a given length."""
     count = max(shape, default=0) if rows is None else rows
     needed = f"({count},)" if count else "(n,) with n >= 1"
     return ParameterError(f"{name} has the shape {shape}; {needed} is needed{each and ', '}{each}")
 
 
 def matched(**given: Any) -> tuple[NDArray[np.float64], ...]:
-    """Finite numbers by the names of their arguments, brought to one shape; a number goes with an
-    array of any.
-    """
+    """Check finite numbers by the names of their arguments, and broadcast them to one shape."""
     import numpy as np
 
     arrays = {name: as_numbers(name, values) for name, values in given.items()}
@@ -96,7 +90,7 @@ def matched(**given: Any) -> tuple[NDArray[np.float64], ...]:
 
 
 def contraction_of(contraction: Any, length: Any, rest_length: float) -> Any:
-    """The contraction [1] that is given, by itself or by a length [m]; one of the two has to be."""
+    """Contraction [1], given as such or computed from a length [m]; exactly one is needed."""
     import numpy as np
 
     if (contraction is None) == (length is None):
@@ -146,7 +140,7 @@ def without_units(name: str, values: Any) -> None:
 
 
 def is_quantity(value: Any) -> bool:
-    """Whether something is a number or an array with a unit of its own, as pint has them."""
+    """True for a number or an array with a unit of its own, as pint has them."""
     return hasattr(value, "magnitude") and hasattr(value, "to")
 
 
@@ -221,7 +215,7 @@ def quantities(function: Callable[Given, Result]) -> Callable[Given, Result]:
 
 
 def _with_units(value: Any) -> bool:
-    """Whether a value has a unit of its own, or one that is in it."""
+    """True where a value is a quantity of pint, or contains one."""
     if isinstance(value, (float, int, str)) or value is None:
         return False
     if type(value) is dict:
@@ -280,9 +274,7 @@ def finite(name: str, value: Any) -> float:
 
 
 def _parsed(value: Any) -> float:
-    """A value as a number; one of `_NO_NUMBER` is raised where it is none. Text is none, whatever
-    it says.
-    """
+    """Number of a value; raises one of `_NO_NUMBER` where it is none, as for every text."""
     if isinstance(value, (str, bytes, bytearray)):
         raise TypeError
     return float(value)
@@ -345,9 +337,7 @@ def rising(
 
 
 def one_of(name: str, value: Any, allowed: Iterable[Any], *, also: str = "") -> Any:
-    """The value, if it is one of those that are allowed; an error names them otherwise, and says
-    ``also`` behind them: what else would be right, or for what they are.
-    """
+    """Return a value that is among the allowed ones; the error lists them, followed by ``also``."""
     known = list(allowed)
     if value not in known:
         each = f"{'one of ' * (len(known) > 1)}{', '.join(map(repr, known))}"
@@ -406,8 +396,8 @@ _ZEROS: Final = {"braid_angle": "the circumference"}
 
 
 def angle_meant(name: str, angle: float, lower: float, upper: float) -> str:
-    """What a refused angle [rad] was likely meant as, in words that go behind the refusal: degrees,
-    or the angle from the other line; empty where neither is allowed.
+    """Likely meaning of a refused angle [rad], in words behind the refusal: degrees, or the angle
+    from the other line; empty where neither is allowed.
     """
     zero, degrees = _ZEROS.get(name.rpartition(".")[2], ""), math.radians(angle)
     others = (0.5 * math.pi - angle, 0.5 * math.pi - degrees) if zero else ()
@@ -521,5 +511,5 @@ def doubt(said: str, *, inside: int = 1) -> None:
 
 
 def by_hand(value: float) -> bool:
-    """Whether a number has so few digits that a person wrote it, and no sensor did."""
+    """True where a number has at most two digits, as a person writes it and no sensor does."""
     return float(f"{value:.2g}") == value

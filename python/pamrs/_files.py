@@ -241,7 +241,7 @@ def resolved(path: str | os.PathLike[str]) -> Path:
 
 
 def is_inside(folder: Path, path: Path) -> bool:
-    """Whether a file is in a folder or below it, links followed.
+    """True where a file is in a folder or below it, links followed.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A part of some work that fails costs that part alone, and is told.
+"""Records parts of a work that failed, so that the others go on.
 
 Errors that the work expects are handled where they arise; here is what nobody expected: a mistake
 of the program, a matrix that cannot be inverted, memory that is not there. Under a test
@@ -28,7 +28,7 @@ def reason(error: BaseException) -> str:
 
 
 class Losses:
-    """What failed and was left out; threads may share one.
+    """Parts of a work that failed and were left out; threads may share one.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Losses:
         *,
         through: tuple[type[Exception], ...] = (),
     ) -> Found | Instead | None:
-        """What some work gives, or something in its place where it fails.
+        """Do a part of the work; return its result, or a substitute where it fails.
 
         Parameters
         ----------
@@ -94,11 +94,11 @@ class Losses:
             return instead
 
     def add(self, what: str, error: BaseException) -> None:
-        """Tell of something that failed."""
+        """Note that a part failed and was left out, with the reason."""
         self.tell(f"{what} failed and was left out ({reason(error)}); please report it")
 
     def tell(self, text: str) -> None:
-        """Tell a sentence, once."""
+        """Note a sentence, unless it is noted already."""
         with self._lock:
             if text not in self.told:
                 self.told.append(text)

@@ -1,5 +1,5 @@
-"""How far a long work is, and when it will be done: lines of text for whoever asks, for a notebook,
-and for ``logging.getLogger("pamrs")``, which is silent unless a program wants to hear it.
+"""Progress of long work, with the time left: lines of text for a callable, for a notebook, and for
+``logging.getLogger("pamrs")``, which is silent unless a program wants to hear it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NEARLY: Final = 0.95
 
 
 class Line(str):
-    """What is going on.
+    """Text on the progress of a work, with the share done and the time left.
 
     Attributes
     ----------
@@ -77,8 +77,8 @@ def duration_words(seconds: float) -> str:
 
 
 class Steps:
-    """The lines of a work whose length nobody knows beforehand: what each step says is passed on
-    with the share that is done and the time that is left. Threads may share one.
+    """Progress of a work of unknown length: each step's line is passed on with the share done and
+    the time left. Threads may share one.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class Steps:
 
 
 def _time_left(passed: float, share: float) -> float | None:
-    """How long a work goes on that took so long for a share [s]; None at its begin, and near its
+    """Time left [s] of a work that took ``passed`` for a share; None at its begin, and near its
     end, where one more law of the rig file may be tried.
     """
     known = _LEAST_SHARE <= share < _NEARLY or share == 1.0
@@ -133,8 +133,8 @@ def _time_left(passed: float, share: float) -> float | None:
 def at_even_times(
     text: str, tell: Callable[[str], object], seconds: float
 ) -> Iterator[Callable[[str], None]]:
-    """Tell every so many seconds how far a work is, whether it says something just then or not;
-    what it gives takes the lines of the work.
+    """Report the progress of a work every so many seconds, whether it says something just then or
+    not; gives a function that takes the lines of the work.
     """
     began, said, ended = time.monotonic(), deque([text], maxlen=1), threading.Event()
 
@@ -157,7 +157,9 @@ def at_even_times(
 
 
 def receiver(given: Callable[[str], object] | None) -> Callable[[str], object]:
-    """What takes lines: what is given, else the output of a notebook's cell, else nothing."""
+    """Callable that takes lines: the one given, else the output of a notebook's cell, else one that
+    drops them.
+    """
     if given is not None:
         return given
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
@@ -165,7 +167,7 @@ def receiver(given: Callable[[str], object] | None) -> Callable[[str], object]:
 
 
 def _in_notebook() -> Callable[[str], object]:
-    """One line of a cell's output that is written anew."""
+    """Function that shows lines in a notebook's cell, each replacing the one before."""
     display: Any = sys.modules["IPython"].display.display
     handle: list[Any] = []
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Columns(NamedTuple):
-    """What a table has.
+    """Content of a table.
 
     Attributes
     ----------
@@ -44,10 +44,10 @@ def over_time(time: Any, channels: Mapping[str, Any], units: Mapping[str, str]) 
 
 
 class Tabular:
-    """What has columns."""
+    """Base of results that convert to tables of xarray and pandas."""
 
     def _columns(self) -> Columns:
-        """Its columns."""
+        """Columns of the result, given by a subclass."""
         raise NotImplementedError
 
     def to_xarray(self) -> xr.Dataset:

@@ -1,4 +1,5 @@
-"""What draws itself: `plot(ax)`, and in a notebook a picture with the main numbers.
+"""Base of results that draw themselves: `plot(ax)`, and in a notebook a picture with the main
+numbers.
 
 Each class says which panels it has and which numbers; everything else is here. matplotlib is
 imported when something is drawn.
@@ -38,10 +39,10 @@ _TELLING: Final[tuple[str, ...]] = (
 
 
 class View:
-    """What can be drawn: panels, and numbers with units."""
+    """Base of results that can be drawn: panels, and numbers with units."""
 
     def _panels(self) -> Panels:
-        """What draws each panel."""
+        """Functions that draw the panels, by their names."""
         raise NotImplementedError
 
     def _numbers(self) -> dict[str, str]:

@@ -101,7 +101,7 @@ class Channel:
         return self.units or (self.unit,)
 
     def has(self, trait: str) -> bool:
-        """Whether a trait is one of its own."""
+        """True where the channel has a trait."""
         return trait in self.traits.split()
 
 
@@ -237,7 +237,9 @@ def rate_of(name: str) -> str:
 
 
 def recorded_as(name: str) -> str:
-    """What a recording calls a simulated channel: ``force`` is what it has of ``muscle_force``."""
+    """Name in a recording of a simulated channel: ``force`` for ``muscle_force``, others as they
+    are.
+    """
     kind, dot, block = name.partition(".")
     return f"{'force' if kind == 'muscle_force' else kind}{dot}{block}"
 

@@ -13,7 +13,7 @@ __all__ = ["Rule", "holds", "is_finite", "is_name", "is_text", "problems_of", "u
 
 
 class Rule(NamedTuple):
-    """What a key of a table may be.
+    """Rule for the value of a key in a table.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Rule(NamedTuple):
 
 
 def is_finite(value: object) -> bool:
-    """Whether something is a number, and no flag."""
+    """True for a finite number that is no flag."""
     if not isinstance(value, (int, float)) or isinstance(value, bool):
         return False
     try:
@@ -41,12 +41,12 @@ def is_finite(value: object) -> bool:
 
 
 def is_text(value: object) -> bool:
-    """Whether something is a text."""
+    """True for a text."""
     return isinstance(value, str)
 
 
 def is_name(value: object) -> bool:
-    """Whether something is a text with a character at least."""
+    """True for a text with a character at least."""
     return isinstance(value, str) and value != ""
 
 
@@ -76,7 +76,7 @@ def problems_of(
     needed: Iterable[str] = (),
     skip: Iterable[str] = (),
 ) -> list[str]:
-    """What is wrong with a table: keys that are unknown, missing, or not what their rules say.
+    """Problems of a table: keys that are unknown, missing, or not what their rules say.
 
     Parameters
     ----------

@@ -78,7 +78,7 @@ def missing_package(error: ImportError, extra: str) -> MissingPackageError:
 
 
 def meant(given: str, allowed: Iterable[str]) -> str:
-    """What an unknown name may have meant, else the names that there are.
+    """Hint on an unknown name: the nearest known one, else all of them.
 
     Parameters
     ----------

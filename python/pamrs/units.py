@@ -303,7 +303,7 @@ def _compound(text: str) -> Unit:
 
 
 def same_dimension(first: str, second: str) -> bool:
-    """Whether two units measure the same thing.
+    """True where two units measure the same thing.
 
     Parameters
     ----------

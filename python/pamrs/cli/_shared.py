@@ -1,5 +1,5 @@
-"""What the commands of ``pamrs`` share: numbers with units, muscles by name, files to write,
-progress, silence, arguments.
+"""Helpers that the commands of ``pamrs`` share: numbers with units, muscles by name, files to
+write, progress, silence, arguments.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def file_of(path: Path | None) -> Path | None:
 
 
 def json_help(schema: str) -> str:
-    """What ``--json`` of a command does."""
+    """Help text of the option ``--json``."""
     return f"Write the result (schema {schema}); -: to standard output, with nothing else on it."
 
 
@@ -150,7 +150,7 @@ def exact(name: str, text: str, dimension: str) -> float:
 def named_muscle(
     name: str, option: str = "--muscle"
 ) -> tuple[Muscle, dict[str, float], Rig | None]:
-    """The muscle of a rig file, or of the library, what is known of its geometry, and the rig."""
+    """Muscle of a rig file or of the library, the tolerances of its geometry, and the rig."""
     from pamrs import library
     from pamrs.rig import load_rig
 

@@ -35,26 +35,26 @@ class _Guarded(io.TextIOBase):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """Of the stream itself."""
+        """Encoding of the inner stream, ``utf-8`` where it has none."""
         return getattr(self.inner, "encoding", None) or "utf-8"
 
     @property
     def errors(self) -> str:  # type: ignore[override]
-        """What it cannot encode is shown by its number."""
+        """Error handler: characters that cannot be encoded are shown by their number."""
         return "backslashreplace"
 
     def isatty(self) -> bool:
-        """Whether a person is looking."""
+        """True where the inner stream is a terminal."""
         return self.inner is not None and self.inner.isatty()
 
     def fileno(self) -> int:
-        """Of the stream itself."""
+        """File number of the inner stream; an error where it is closed."""
         if self.inner is None:
             raise io.UnsupportedOperation("fileno")
         return self.inner.fileno()
 
     def writable(self) -> bool:
-        """What is written is never an error."""
+        """True always: writing is never refused."""
         return True
 
     def write(self, text: str) -> int:
@@ -66,10 +66,10 @@ class _Guarded(io.TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Nothing: what is written is sent at once."""
+        """Do nothing: text is sent as it is written."""
 
     def _sent(self, text: str) -> bool:
-        """Whether a text could be written."""
+        """Write a text to the inner stream; True where that worked."""
         if self.lost:
             return False
         try:
@@ -84,7 +84,7 @@ class _Guarded(io.TextIOBase):
         return not self.lost
 
     def _drop(self) -> None:
-        """What is left in the buffer would be tried again when the process ends."""
+        """Discard the buffered rest, which the end of the process would try to write again."""
         with contextlib.suppress(OSError, ValueError):
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, self.fileno())
@@ -115,12 +115,12 @@ def guarded() -> Iterator[list[str]]:
 
 
 def _fill() -> None:
-    """Take the numbers of closed standard streams, which the next file would get otherwise."""
+    """Occupy the numbers of closed standard streams, so that no file is opened under them."""
     while (number := os.open(os.devnull, os.O_RDWR)) <= 2:  # noqa: PLR2004
         pass
     os.close(number)
 
 
 def terminal() -> Any:
-    """Standard error as a terminal takes it, with what moves its cursor: for what draws there."""
+    """Inner stream of standard error, for output that moves the cursor."""
     return sys.stderr.inner if isinstance(sys.stderr, _Guarded) else sys.stderr

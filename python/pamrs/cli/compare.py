@@ -35,7 +35,7 @@ def compare_command(
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
-    """What two results are called: their files or folders, in full where these are the same."""
+    """Names of two results: their files or folders, in full where these are the same."""
     one, other = map(_short, (first, second))
     return (one, other) if one != other else (str(first), str(second))
 

@@ -221,7 +221,7 @@ def _plan(
     *,
     perfect_model: bool,
 ) -> None:
-    """What a diagnosis could tell, to standard output and a file; noise by its dimension."""
+    """Print what a diagnosis of a rig could find, given noise by dimension, or write it as JSON."""
     from json import dumps
 
     from pamrs.diagnosis.next_experiment import measurable, plan_diagnosis

@@ -40,7 +40,7 @@ _MODULI: Final = {"modulus_slope": "dimensionless"}
 
 
 class FrictionChoice(StrEnum):
-    """Where the friction of the muscle comes from."""
+    """Source of the muscle's friction."""
 
     fit = "fit"
     none = "none"
@@ -317,9 +317,7 @@ def _own_friction(muscle: Muscle) -> str:
 def _comparison(
     data: ForceMap, muscle: Muscle, order: int | None, shape: dict[str, Any]
 ) -> ModelComparison:
-    """Every model, in the orders 1 to 4 and that of the fit, and in the geometry asked for where
-    the muscle's own model is meant.
-    """
+    """Fits of every model, in orders 1 to 4 and the fit's own, and in the geometry asked for."""
     from pamrs.fit import compare_models
 
     settings = {key: value for key, value in shape.items() if key != "geometry"}
@@ -347,7 +345,7 @@ class _Inputs:
 
 
 def _shape(context: typer.Context, inputs: _Inputs) -> tuple[dict[str, Any], list[str]]:
-    """What a fit and a comparison both take, and notes on what is not used."""
+    """Arguments that a fit and a comparison share, and notes on what is not used."""
     from pamrs.rig.muscle_models import ELASTIC_PARAMETERS
 
     keys = ("model", "geometry", "levels", "free", "prior", "noise")
@@ -375,7 +373,7 @@ def _shape(context: typer.Context, inputs: _Inputs) -> tuple[dict[str, Any], lis
 
 
 def _inputs(context: typer.Context) -> _Inputs:
-    """From a description, or from a table and the options."""
+    """Read the inputs of a fit, from a description or from a table and the options."""
     given, data = context.params, context.params["data"]
     if data.suffix.lower() == ".toml":
         others = ("muscle", *GEOMETRY, "where", "clipped")
@@ -408,9 +406,7 @@ def _table(given: Mapping[str, Any], rest_length: float) -> ForceMap:
 
 
 def _loops(context: typer.Context) -> ForceMap:
-    """The map of hysteresis loops: friction needs the rest length alone, any other size is for the
-    check of the forces.
-    """
+    """Map of hysteresis loops; only the rest length is needed, other sizes check the forces."""
     given = context.params
     sizes = {name for name in GEOMETRY if given[name] is not None}
     described = given["data"].suffix.lower() == ".toml"
@@ -458,7 +454,7 @@ def _filter(text: str) -> tuple[str, str]:
 
 
 def _start(given: Mapping[str, Any]) -> tuple[Muscle, dict[str, float], Rig | None]:
-    """The nominal muscle, what is known of it, and the rig that it is of."""
+    """Nominal muscle from a name or from options, the tolerances of its geometry, and its rig."""
     from pamrs.rig import Muscle
 
     values: dict[str, Any] = {}
@@ -485,7 +481,7 @@ def _start(given: Mapping[str, Any]) -> tuple[Muscle, dict[str, float], Rig | No
 def _summary(
     fit: MuscleFit, comparison: ModelComparison | None, friction: str, notes: Sequence[str]
 ) -> str:
-    """What goes to standard output."""
+    """Text of a fit for standard output."""
     cross, reason = _left_out(fit)
     lines = [
         fit.fit_report().rstrip("\n"),

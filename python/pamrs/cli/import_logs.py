@@ -118,7 +118,7 @@ def _spacing(text: str) -> float:
 def _rig_beside(
     rig: Path | None, folder: Path, *, copy: bool, written: bool
 ) -> tuple[str, Contents]:
-    """What case.toml calls the rig file, and the file that it needs beside it."""
+    """Name of the rig file in ``case.toml``, and its text where it has to be written there."""
     beside = folder / "rig.toml"
     if rig is None:
         return beside.name, {}
@@ -143,7 +143,7 @@ def _rig_beside(
 
 
 def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
-    """Where logs that lie outside a folder are copied to; nothing is overwritten."""
+    """Targets for logs outside a folder that are copied into it; existing ones are refused."""
     if folder is None:
         raise ParameterError("copy needs a folder: give it as --out")
     targets = {path: folder / path.name for path in logs if not is_inside(folder, path)}

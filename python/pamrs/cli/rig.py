@@ -54,9 +54,7 @@ def _rig_check(file: RigName) -> None:
 
 
 def _of_effects(rig: Rig) -> dict[str, str]:
-    """Value, standard deviation and bounds of every parameter of the effects, by its name in
-    full.
-    """
+    """Value, standard deviation and bounds of every effect parameter, by its full name."""
     if not rig.effects:
         return {}
     from pamrs.effects import EFFECTS

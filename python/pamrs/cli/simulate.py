@@ -225,7 +225,7 @@ def _held(text: str, time: Array, known: list[str]) -> tuple[str, Array]:
 
 
 def _parted(option: str, text: str, example: str) -> tuple[str, str]:
-    """What stands before and behind ``=``."""
+    """Split the text of an option at its ``=``."""
     name, equals, value = text.partition("=")
     if not equals:
         raise refused(f"--{option}", text, f"{example} is needed")

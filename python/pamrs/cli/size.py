@@ -110,16 +110,14 @@ def size_command(
 
 
 def _size(name: str, text: str, dimension: str, *, zero: bool = False) -> float:
-    """The same, finite and above zero, or zero where that is allowed."""
+    """Number with a unit in SI, finite and above zero, or zero where that is allowed."""
     value = exact(name, text, dimension)
     with naming(name, text):
         return positive(dimension, value, zero=zero)
 
 
 def _measures(text: str, unit: str) -> bool:
-    """Whether a number with a unit has the dimension of ``unit``; False where it has no unit that
-    is known.
-    """
+    """True where a number's unit is known and has the dimension of ``unit``."""
     match = QUANTITY.match(text)
     try:
         return match is not None and same_dimension(match["unit"] or "", unit)

@@ -86,8 +86,8 @@ class JointDesign:
 
     @property
     def shortfall(self) -> tuple[float, float]:
-        """How far the least torque is below the wanted one, over the wanted one [1], 0 where
-        nothing is; and its angle [rad].
+        """Largest deficit of the torque, as a share of the wanted one [1], 0 where there is none;
+        and its angle [rad].
         """
         torque = self.scores.torque[0]
         index = int(np.argmin(torque))
@@ -95,8 +95,8 @@ class JointDesign:
         return (share if share > _ROUNDING else 0.0), float(self.problem.angles[index])
 
     def met(self, tolerance: float | None = None) -> bool:
-        """Whether the whole range is reached and the area below the threshold is at most a share of
-        that under it.
+        """True where the whole range is reached and the area below the threshold is at most a share
+        of that under it.
 
         The share is ``tolerance``, by default :attr:`area_tolerance`. The torque may be below the
         wanted one by more than that over a few angles: see :attr:`shortfall`.
@@ -299,9 +299,7 @@ def _smallest(
     seed: int,
     progress: Progress | None,
 ) -> tuple[Array, float, int]:
-    """Lengths in the problem's bounds (4,) with the smallest objective of points (n, 4), that
-    objective, and how many were tried.
-    """
+    """Lengths (4,) with the smallest objective of points (n, 4), the objective, count of tries."""
     from scipy.optimize import Bounds, differential_evolution
 
     whole("evaluations", evaluations, _GENERATION)

@@ -36,7 +36,7 @@ _HOPELESS: Final = 1e10
 
 @dataclass(frozen=True)
 class Scores:
-    """What some designs are worth; every array has one row for each design.
+    """Objective of some designs and its parts; every array has one row for each design.
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ class JointProblem:
         return self.max_contraction * float(self.muscle.parameters["rest_length"])
 
     def replace(self, **changes: Any) -> JointProblem:
-        """The same problem with other parameters."""
+        """Copy of the problem with other parameters."""
         return replace(self, **changes)
 
     def joint(self, design: ArrayLike) -> Joint:
@@ -334,7 +334,9 @@ class JointProblem:
         return contraction, arm, torque_arm, held
 
     def _turned(self, contraction: Array, arm: Array, held: Mask) -> Mask:
-        """Where the muscles can turn the joint."""
+        """True where the muscles can turn the joint: reached, with an arm above zero, not
+        contracted too far.
+        """
         with np.errstate(invalid="ignore"):
             return np.asarray(
                 held & (arm > 0.0) & (contraction <= self.max_contraction * (1.0 + 1e-12))

@@ -30,7 +30,7 @@ _LAMINAR: Final = 0.999  # the orifice law changes its form at these two ratios
 
 @dataclass(frozen=True)
 class Filling:
-    """Where the air comes from: a constant supply behind one valve, isothermal.
+    """Supply of the air: a constant pressure behind one valve, isothermal.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Requirement:
-    """What the bundle must pull, at which stroke.
+    """Force that the bundle must pull, over the stroke.
 
     Parameters
     ----------

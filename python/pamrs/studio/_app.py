@@ -63,7 +63,7 @@ _STYLE: Final = Path(__file__).parents[1] / "report" / "style.css"
 
 
 class _Guard:
-    """Lets in who has the token, by the address on this computer that was told."""
+    """Middleware that answers only with the token, at an address of this computer."""
 
     def __init__(self, app: ASGIApp, token: str) -> None:
         self._app, self._token = app, token
@@ -132,7 +132,7 @@ async def _upload(studio: Studio, request: Request) -> None:
 
 
 def _did(studio: Studio, what: str, given: dict[str, Any]) -> None:
-    """One press of a button."""
+    """Carry out the action of a button."""
     done: dict[str, Callable[[], object]] = {
         "rig": lambda: studio.put_rig(str(given.get("text", ""))),
         "packaged": lambda: studio.put_packaged(str(given.get("name", ""))),

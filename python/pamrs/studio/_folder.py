@@ -134,7 +134,7 @@ class Studio:
             return ""
 
     def empty(self) -> bool:
-        """Whether nothing is in the folder."""
+        """True where nothing is in the folder."""
         return not any(self.folder.iterdir())
 
     def files(self) -> Iterator[Path]:
@@ -147,7 +147,7 @@ class Studio:
                     yield file
 
     def new_log(self, name: str) -> Path:
-        """Where a log of that name is to be put.
+        """Path for a new log of that name.
 
         Raises
         ------
@@ -207,11 +207,11 @@ class Studio:
     # Data --------------------------------------------------------------------------------------
 
     def changed(self) -> None:
-        """Something was changed: the check and what is proposed are forgotten."""
+        """Forget the check and the proposals after a change."""
         self.checked = self._tables = None
 
     def tables(self) -> tuple[list[Table], str]:
-        """What is proposed, or was confirmed, for each log, and why some are not read."""
+        """Entries proposed or confirmed for each log, and the errors of unreadable logs."""
         if self._tables is None:
             items, failed = list[LogProposal](), list[str]()
             for path in self.logs():
@@ -225,7 +225,7 @@ class Studio:
         return self._tables, self._unread
 
     def _proposed(self, log: Path) -> list[LogProposal]:
-        """What is proposed for a log; it is read again where it or the rig has changed."""
+        """Proposals for a log; it is read again where it or the rig has changed."""
         now = log.stat()
         key = (now.st_mtime_ns, now.st_size, self.text("rig.toml"))
         if log not in self._read or self._read[log][0] != key:
@@ -266,7 +266,7 @@ class Studio:
 
     @property
     def foreign(self) -> bool:
-        """Whether there is a ``case.toml`` that was not made here."""
+        """True where there is a ``case.toml`` that was not made here."""
         text = self.text("case.toml")
         return bool(text) and not text.startswith(_HEAD)
 
@@ -332,7 +332,7 @@ class Studio:
 
     @property
     def green(self) -> bool:
-        """Whether the case was checked, can be diagnosed, and was not changed on the page since."""
+        """True where the case was checked, can be diagnosed, and has not changed since."""
         return self.checked is not None and not self.checked.error
 
     def start(self) -> None:
@@ -377,7 +377,7 @@ class Studio:
             return None, self.said(error)
 
     def stale(self, found: Diagnosis) -> bool:
-        """Whether a result was made from other files than those that were checked."""
+        """True where a result was made from other files than those that were checked."""
         return self.checked is not None and self.green and found.inputs != self.checked.inputs
 
 
@@ -472,7 +472,7 @@ def _chosen(table: Table, columns: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Check:
-    """What a check of the case found.
+    """Result of a check of the case.
 
     Attributes
     ----------
@@ -512,7 +512,7 @@ def checked(case: Case) -> Check:
 
 
 def _issues(case: Case) -> list[str]:
-    """What was found in the recordings, each kind of it once."""
+    """Issues of the recordings, each text once with its count."""
     found: dict[str, int] = {}
     for recording in case.recordings:
         for issue in recording.issues:
