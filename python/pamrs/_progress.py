@@ -50,7 +50,7 @@ class Line(str):
 
     @property
     def whole(self) -> str:
-        """With percent and time left: ``"42 %, about 9 s left: shoulder: screened"``."""
+        """Text with percent and time left: ``"42 %, about 9 s left: shoulder: screened"``."""
         if self.share is None:
             return str(self)
         left = "" if self.left is None else f", about {duration_words(self.left)} left"

@@ -87,12 +87,12 @@ class Channel:
 
     @property
     def strong(self) -> frozenset[str]:
-        """Each of `words`."""
+        """Set of the words that name the channel."""
         return frozenset(self.words.split())
 
     @property
     def weak(self) -> frozenset[str]:
-        """Each of `hints`."""
+        """Set of the words that hint at the channel."""
         return frozenset(self.hints.split())
 
     @property

@@ -17,21 +17,21 @@ def _beginning(names: Iterable[str], incomplete: str) -> list[str]:
 
 
 def effect_ids(incomplete: str) -> list[str]:
-    """Effects of the catalogue that begin so."""
+    """Ids of effects that begin with a text."""
     from pamrs.effects import CATALOGUE
 
     return _beginning(CATALOGUE, incomplete)
 
 
 def muscle_names(incomplete: str) -> list[str]:
-    """Muscles of the library that begin so."""
+    """Names of muscles of the library that begin with a text."""
     from pamrs import library
 
     return _beginning(library.names(), incomplete)
 
 
 def rig_names(incomplete: str) -> list[str]:
-    """Rigs of the package that begin so."""
+    """Names of rigs of the package that begin with a text."""
     from pamrs import rigs
 
     return _beginning(rigs.names(), incomplete)

@@ -153,7 +153,7 @@ def after(simulator: Simulator, inputs: Mapping[str, float]) -> dict[str, float]
 
 
 def closed(rig: Rig) -> dict[str, float]:
-    """Every valve at its null."""
+    """Commands that close every valve: its null [V] by the channel."""
     return {
         dotted("valve_command", name): float(table["null_voltage"])
         for name, table in rig.tables("valve").items()
@@ -161,7 +161,7 @@ def closed(rig: Rig) -> dict[str, float]:
 
 
 def kept(rig: Rig, sample: Mapping[str, float]) -> dict[str, float]:
-    """Every regulator set to the pressure that it has."""
+    """Commands that set every regulator to the pressure that it has."""
     return {
         dotted("supply_command", name): sample[dotted("supply_pressure", name)]
         for name, table in rig.tables("supply").items()

@@ -157,7 +157,7 @@ class Feedforward(SampledController):
 
     @classmethod
     def from_rig(cls, rig: Rig, km: Value = 0.5, **others: object) -> Feedforward:
-        """With the full model of a rig.
+        """Make a feedforward with the full model of a rig.
 
         Parameters
         ----------
@@ -191,7 +191,7 @@ class Feedforward(SampledController):
         )
 
     def offset(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """As :meth:`update`, less the valve's null [V]."""
+        """Command of :meth:`update` less the valve's null [V]."""
         aim = self._aim(reference)
         pressure = self._read(measurement, "muscle_pressure")
         supply = (

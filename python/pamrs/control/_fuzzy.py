@@ -202,7 +202,7 @@ class Fuzzy(OutputFeedback):
     def answer(
         self, time: float, measurement: Measurement, reference: Reference, bias: Value
     ) -> Value:
-        """As :meth:`update`, with ``bias`` [V] added before the limits."""
+        """Command of :meth:`update`, with ``bias`` [V] added before the limits."""
         aim = self._aim(reference)
         if bias.__class__ is not float:
             bias = self._sized("bias", bias)

@@ -34,8 +34,8 @@ _LEAST: Final = 0.05  # of C1 without friction that stays in any case
 
 
 class SlipMemory(Stateful):
-    """Which way a muscle has been moving: four Maxwell-slip elements, rate-independent, as the
-    core's.
+    """Memory of a muscle's direction of motion: four Maxwell-slip elements, rate-independent, as
+    the core's.
 
     Parameters
     ----------

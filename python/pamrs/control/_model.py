@@ -70,7 +70,7 @@ class JointModel(abc.ABC):
 
     @property
     def gains(self) -> tuple[Value, ...]:
-        """Everything that may be an array of a batch."""
+        """Values that may be arrays of a batch."""
         return tuple(p.value for p in self.parameters)
 
     def springs(self, angle: Value) -> Value:
@@ -236,7 +236,7 @@ class ArmModel(JointModel):
         return dataclasses.replace(self, **changes)
 
     def scaled(self, factor: Value) -> Self:
-        """With ``I``, ``b`` and ``m g r`` times a factor: the wrong estimates of 5.4.1, 0.1
+        """Copy with ``I``, ``b`` and ``m g r`` times a factor: the wrong estimates of 5.4.1, 0.1
         and 10.
         """
         return self.replace(

@@ -220,7 +220,7 @@ class JointSensor(Stateful):
 
     @property
     def gains(self) -> tuple[Value, ...]:
-        """Everything that may be an array: the time constants [s]."""
+        """Values that may be arrays of a batch: the time constants [s]."""
         return self.low_pass.time_constant, self.slope.time_constant
 
     def read(

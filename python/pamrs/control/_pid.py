@@ -62,7 +62,7 @@ class OutputFeedback(SampledController):
     def answer(
         self, time: float, measurement: Measurement, reference: Reference, bias: Value
     ) -> Value:
-        """As :meth:`update`, with ``bias`` [V] added before the limits: a feedforward beside it."""
+        """Command of :meth:`update`, with ``bias`` [V], a feedforward, added before the limits."""
 
 
 class PIDLaw(Stateful):
@@ -124,7 +124,7 @@ class PIDLaw(Stateful):
 
     @property
     def gains(self) -> tuple[Value, ...]:
-        """Everything that may be an array."""
+        """Values that may be arrays of a batch."""
         return self._kp, self._ki, self._kd, self._output_filter, self.integrator._tracking
 
     def update(self, error: Value, error_rate: Value = 0.0, bias: Value = 0.0) -> Value:
@@ -250,8 +250,8 @@ class PID(OutputFeedback):
     def answer(
         self, time: float, measurement: Measurement, reference: Reference, bias: Value
     ) -> Value:
-        """As :meth:`update`, with ``bias`` [V] added before the limits, so that the anti-windup
-        knows of a feedforward beside it.
+        """Command of :meth:`update`, with ``bias`` [V], a feedforward, added before the limits, so
+        that the anti-windup includes it.
         """
         aim = self._aim(reference)
         if bias.__class__ is not float:

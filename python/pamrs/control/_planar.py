@@ -188,7 +188,7 @@ class PlanarArmModel(JointModel):
         return dataclasses.replace(self, **changes)
 
     def scaled(self, factor: float) -> PlanarArmModel:
-        """With inertias, friction and weights times a factor."""
+        """Copy with inertias, friction and weights times a factor."""
         return self.replace(
             coupling=self.coupling * factor,
             weight=self.weight * factor,
@@ -202,7 +202,7 @@ class PlanarArmModel(JointModel):
 
     @property
     def gains(self) -> tuple[Value, ...]:
-        """None: the parameters are numbers of the one model."""
+        """Values that may be arrays of a batch: none."""
         return ()
 
     @property

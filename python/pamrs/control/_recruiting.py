@@ -142,14 +142,14 @@ class Recruitment(Share):
 
     @property
     def shares(self) -> tuple[Value, ...]:
-        """Of each group: 1 while it carries its whole share, 0 none; below 0 it is being filled or
-        vented, and without air at -0.3.
+        """Ramp of each group: 1 while it carries its whole share, 0 none; below 0 it is being
+        filled or vented, and without air at -0.3.
         """
         return tuple(getattr(self, name) for name in self._shares)
 
     @property
     def vented(self) -> tuple[Any, ...]:
-        """Of each group, whether it is without air; see :attr:`Share.vented`."""
+        """True for each group without air; see :attr:`Share.vented`."""
         return tuple(share <= -_FILL for share in self.shares)
 
     def pressures(self, demand: Demand) -> list[Value]:

@@ -255,9 +255,9 @@ class RigController(SampledController):
 
     @property
     def command_ranges(self) -> dict[str, tuple[float, float, float]]:
-        """Of every command by its name, ``valve_command.flexor``: a value that is safe, the lowest
-        and the highest. A valve is closed at its safe one and keeps the air, a regulator is set to
-        the ambient pressure.
+        """Safe, lowest and highest value of every command by its name, ``valve_command.flexor``. A
+        valve is closed at its safe value and keeps the air, a regulator is set to the ambient
+        pressure.
         """
         found = {}
         for group in (*self.model.groups, *self.model.vented):

@@ -25,7 +25,7 @@ from pamrs.errors import ParameterError
 
 
 class Stateful:
-    """Something with a state that can be read, given back and forgotten.
+    """Base of parts with a state that can be read, restored and forgotten.
 
     A subclass lists its own numbers in ``_STATE`` (name -> start value; the attribute has an
     underscore before the name) and the attributes that are stateful themselves in ``_PARTS``.
@@ -173,7 +173,7 @@ class Restorer:
         self._in_place = tuple(k for k, changed in enumerate(leaves.values()) if changed)
 
     def take(self) -> Any:
-        """The numbers now."""
+        """Copy of the present numbers."""
         found: Any = self._get(self._part)
         if self._in_place:
             found = list(found)
@@ -182,7 +182,7 @@ class Restorer:
         return found
 
     def put_back(self, taken: Any) -> None:
-        """As they were when they were taken."""
+        """Put numbers of :meth:`take` back."""
         for name, value in zip(
             self._names, taken if len(self._names) > 1 else (taken,), strict=True
         ):

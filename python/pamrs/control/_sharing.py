@@ -70,14 +70,14 @@ class Share(Stateful):
 
     @property
     def vented(self) -> tuple[Any, ...]:
-        """Of each group, whether it is left open to the ambient since it is not used: a pressure
+        """True for each group that is left open to the ambient since it is not used: a pressure
         loop would feed it from the supply wherever it is drawn out below the ambient pressure.
         """
         return (False,) * len(self.groups)
 
 
 class Together(Share):
-    """Every group of one side has the same pressure: the drive itself."""
+    """Share with one pressure for every group of a side: the drive itself."""
 
     def pressures(self, demand: Demand) -> list[Value]:
         """See :meth:`Share.pressures`."""

@@ -375,7 +375,8 @@ class SimplifiedTorque:
         high: float = math.radians(110.0),
         pressure: float | None = None,
     ) -> SimplifiedTorque:
-        """By least squares from the full model, over even angles and pressures from zero.
+        """Fit the simplified model to the full one by least squares, over even angles and pressures
+        from zero.
 
         Parameters
         ----------

@@ -229,8 +229,8 @@ def rms(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Arra
 
 
 def lag(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Array:
-    """By how much the angle is late: least squares of ``reference - angle = lag * reference'``, to
-    first order in the lag.
+    """Delay of the angle: least squares of ``reference - angle = lag * reference'``, to first order
+    in the lag.
 
     Parameters
     ----------

@@ -187,7 +187,7 @@ class SimulatedDevice:
 
 
 def _at_first(rig: Rig) -> dict[str, float]:
-    """Every command of a rig, as it is before anything is written."""
+    """Value of every command of a rig before anything is written."""
     found = {}
     for name in core_rig(rig).inputs:
         kind, block = channel_of(name), name.partition(".")[2]

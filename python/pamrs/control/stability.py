@@ -207,7 +207,7 @@ def _delayed(model: LinearModel, period: float, delay: float) -> tuple[Array, Ar
 
 
 def _by_inputs(model: LinearModel, controller: LinearController) -> Array:
-    """Which command of a controller is which input of a model."""
+    """Matrix with a 1 where a command of the controller (column) is an input of the model (row)."""
     if controller.outputs == ("",) and len(model.inputs) == 1:
         return np.eye(1)
     if set(controller.outputs) != set(model.inputs):

@@ -152,7 +152,9 @@ class JointDesign:
         return "\n".join(lines)
 
     def _how_met(self) -> str:
-        """Plainly met only where no torque is below the wanted one."""
+        """Words on whether the requirement is met; fully only where no torque is below the wanted
+        one.
+        """
         short, angle = self.shortfall
         if short == 0.0:
             return "the requirement is met"

@@ -344,7 +344,7 @@ class JointProblem:
 
 
 def _checked_bounds(given: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    """Every length with its bounds."""
+    """Check the bounds of every length."""
     check_names("bounds", given, LENGTHS, "length of the joint")
     bounds = {}
     for name in LENGTHS:

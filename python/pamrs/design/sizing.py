@@ -63,8 +63,8 @@ class Filling:
 
     @classmethod
     def from_sonic_conductance(cls, conductance: float, **others: float) -> Filling:
-        """From the sonic conductance of ISO 6358 [m3/(s Pa)], reference air of 1.185 kg/m3 (1 bar,
-        20 degC, 65 %).
+        """Make a supply from the sonic conductance of ISO 6358 [m3/(s Pa)], reference air of 1.185
+        kg/m3 (1 bar, 20 degC, 65 %).
 
         Parameters
         ----------

@@ -358,7 +358,7 @@ class EffectInfo:
         return self.forms[0].parameters
 
     def form(self, name: str = "") -> Form:
-        """One of its forms.
+        """Form of the effect by its name.
 
         Parameters
         ----------
@@ -411,7 +411,7 @@ class EffectInfo:
 
     @property
     def lasting(self) -> tuple[Form, ...]:
-        """Its forms that act all the time, the same in all recordings."""
+        """Forms that act all the time, with the same parameters in all recordings."""
         return tuple(form for form in self.forms if not form.transient)
 
     @property
@@ -425,7 +425,7 @@ class EffectInfo:
         return next(p for p in self.parameters if p.role_in(sealed=False) == "size")
 
     def with_role(self, role: str) -> tuple[EffectParameter, ...]:
-        """Its parameters of a role, in their order."""
+        """Parameters of the first form with a role, in their order."""
         return tuple(p for p in self.parameters if p.role == role)
 
     def dotted(self) -> tuple[str, ...]:

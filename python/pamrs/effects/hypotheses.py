@@ -147,7 +147,7 @@ class Hypothesis:
 
     @cached_property
     def set(self) -> frozenset[Term]:
-        """Its terms in no order."""
+        """Terms as a set."""
         return frozenset(self.terms)
 
     def __str__(self) -> str:

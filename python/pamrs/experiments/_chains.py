@@ -81,7 +81,7 @@ class Chain:
 
     @property
     def commands(self) -> tuple[str, ...]:
-        """Channels of its commands."""
+        """Channels of the chain's commands."""
         if self.regulator is not None:
             return (dotted("supply_command", self.regulator),)
         if not self.valves:
@@ -90,18 +90,18 @@ class Chain:
 
     @property
     def pressure(self) -> str:
-        """Channel of its pressure."""
+        """Channel of the chain's pressure."""
         return dotted("muscle_pressure", self.chamber)
 
     @property
     def seen(self) -> tuple[str, ...]:
-        """Channels that say how high its pressure was: a regulator was set to pressures that its
-        chamber may not have reached.
+        """Channels that show the highest pressure reached: a chamber may not reach what its
+        regulator is set to.
         """
         return (self.pressure, *(self.commands if self.regulator is not None else ()))
 
     def before(self, rig: Rig) -> float:
-        """Its pressure before the first command [Pa]."""
+        """Pressure of the chain before the first command [Pa]."""
         if self.regulator is not None:
             return float(rig.tables("supply")[self.regulator]["initial_pressure"])
         return float(rig.tables("chamber")[self.chamber]["initial_pressure"])

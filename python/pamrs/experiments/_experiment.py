@@ -72,7 +72,7 @@ class Experiment:
 
     @property
     def kind(self) -> str:
-        """Its name without that of a chain."""
+        """Name of the experiment without that of a chain."""
         return self.name.partition(".")[0]
 
     @property

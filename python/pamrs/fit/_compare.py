@@ -1,4 +1,4 @@
-"""Every model side by side, ranked by how well it predicts pressures that it has not seen."""
+"""Compares force models, ranked by the prediction of pressures that their fit has not seen."""
 
 from __future__ import annotations
 
@@ -260,7 +260,7 @@ def _ranked(
 
 
 def recommend(eligible: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Of candidates that predict equally well: one whose geometry is what it was measured to be, if
+    """Choose among candidates that predict equally well: one whose geometry is as measured, if
     there is one; of these the one with the fewest unknowns.
 
     Parameters

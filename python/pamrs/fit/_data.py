@@ -478,7 +478,7 @@ def _reasons(
     faulty: ArrayLike | None,
     clipped: float | None,
 ) -> NDArray[np.object_]:
-    """Why each row by itself is not used, ``""`` where it is; the first reason that applies."""
+    """Reason for which each row is not used, the first that applies; ``""`` where it is used."""
     reason = np.full(len(length), "", dtype=object)
 
     def flag(rows: Mask, why: str) -> None:

@@ -72,7 +72,7 @@ def template(muscle: Muscle, model: str | None, geometry: str | None, order: int
 
 @dataclass(frozen=True)
 class Design:
-    """Which coefficients a fit has, and their columns.
+    """Coefficients of a fit, and their columns in the design matrix.
 
     Attributes
     ----------

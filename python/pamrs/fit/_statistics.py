@@ -224,7 +224,7 @@ class FitStatistics:
 
     @property
     def condition_number(self) -> float:
-        """Of the design matrix of the coefficients, columns scaled to length 1."""
+        """Condition number of the design matrix of the coefficients, columns scaled to length 1."""
         return self._estimate.condition_number
 
     @property

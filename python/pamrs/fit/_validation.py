@@ -46,7 +46,7 @@ class PressureErrors:
 
     @property
     def note(self) -> str:
-        """Which levels are left out of (2.37) and why; empty when none is."""
+        """Note on the levels that are left out of (2.37), with the reason; empty when none is."""
         if not len(self.weak):
             return ""
         names = ", ".join(f"{pressure / 1e3:.5g}" for pressure in self.weak)

@@ -1,5 +1,5 @@
-"""Which way a muscle went where no column says it: from the order of the rows, at held pressures
-from its length, at held lengths from its pressure.
+"""Finds the direction of a muscle's motion where no column gives it: from the order of the rows,
+from its length at held pressures, from its pressure at held lengths.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ _FEW_LATE: Final = 2  # such holes that are told one by one
 
 
 class Event(NamedTuple):
-    """Something the clock did, ``start`` to ``stop`` in seconds of the grid."""
+    """Irregularity of a clock, from ``start`` to ``stop`` in seconds of the grid."""
 
     kind: str
     start: float

@@ -148,7 +148,7 @@ def _as_large(one: str, two: str) -> bool:
 
 
 def unit_trouble(channel: str, unit: str) -> str:
-    """Why a channel cannot be in a unit; empty where it can.
+    """Reason for which a channel cannot be in a unit; empty where it can.
 
     Parameters
     ----------

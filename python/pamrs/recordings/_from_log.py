@@ -270,7 +270,7 @@ class Clocks:
         self._made: dict[tuple[str | int, str | None, float], Ticks] = {}
 
     def of(self, series: Series, clock: Clock) -> Ticks:
-        """When the rows of a series were taken.
+        """Times at which the rows of a series were taken.
 
         Parameters
         ----------

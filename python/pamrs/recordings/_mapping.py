@@ -1,4 +1,4 @@
-"""Which series of a log is which channel: the keys ``channels`` and ``time`` of a recording."""
+"""Maps series of a log to channels: the keys ``channels`` and ``time`` of a recording."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pamrs.units import measured_from, parse_unit, to_si
 
 @dataclass(frozen=True)
 class Clock:
-    """When the samples of a channel were taken.
+    """Clock of a channel: the times at which its samples were taken.
 
     Attributes
     ----------

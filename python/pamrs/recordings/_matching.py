@@ -1,4 +1,4 @@
-"""Which series of a log is likely which channel: by name, unit and range."""
+"""Guesses the channel of each series of a log by name, unit and range."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Match:
     hold: bool = False
 
     def si(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Its values in SI."""
+        """Values of the series in SI."""
         values = self.series.values
         if self.calibration is not None:
             (low, high), (first, last) = self.calibration
@@ -96,7 +96,7 @@ class Match:
 
 @dataclass(frozen=True)
 class Open:
-    """A series that is called like a channel, but whose unit is left to the user.
+    """Series with the name of a channel whose unit is left to the user.
 
     Attributes
     ----------

@@ -435,7 +435,7 @@ class _Clocks:
         return {"column": best.name, "unit": unit}
 
     def of(self, series: Series) -> Ticks | None:
-        """When its rows were taken; None where the log has no clock for it."""
+        """Times of the rows of a series; None where the log has no clock for it."""
         entry = self.entries[series.name]
         if series.time is None and not entry and (self._step is None or series in self._rising):
             return None

@@ -33,7 +33,7 @@ _FEW: Final = 20
 
 @dataclass(frozen=True, slots=True)
 class Issue:
-    """Something found in a recording.
+    """Finding in a recording: a fault of a channel or of the clock, or a remark on its reading.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class OwnValue:
     error: str = "same"
 
     def at(self, elsewhere: float) -> float:
-        """Its value in this recording where a model has another one elsewhere, SI."""
+        """Value in this recording where a model has the value `elsewhere` in the others, SI."""
         if self.error in ("none", "own"):
             return self.value
         if self.error == "proportional":

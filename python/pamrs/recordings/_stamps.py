@@ -105,7 +105,7 @@ def _by_size(size: float, usual: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Ticks:
-    """When the rows of a log were taken.
+    """Times at which the rows of a log were taken, in order.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From the numbers of a log to values: scale and offset, two readings, or a table of more."""
+"""Calibrations from the numbers of a log to values: scale and offset, two readings, or a table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Which block is connected to which: the ports of a rig, what they default to, and what cannot be.
+"""Connections between the blocks of a rig: its ports, their defaults, and those that are
+impossible.
 
 A port is a key that names another block (:data:`pamrs.rig.schema.PORTS`). What a file leaves out
 follows from the names: a valve feeds the chamber of its own name, a muscle pulls on the only joint.
@@ -22,7 +23,7 @@ _NEEDS: Final = (("joint", "muscle"), ("joint", "arm"), ("arm", "joint"), ("load
 
 
 def connect(model: Mapping[str, Any]) -> tuple[Ports, list[str]]:
-    """Every port of a model, given or by default.
+    """Connect every port of a model, as given or by default.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ _MADE = ("_core", "_first", "_inputs", "_channels", "_commands")
 
 
 class Failure(NamedTuple):
-    """Why a plant of a batch has ended.
+    """Reason for which a plant of a batch has ended, with its time.
 
     Attributes
     ----------
@@ -259,12 +259,12 @@ class Batch:
 
     @property
     def side_by_side(self) -> Mask:
-        """Which plants run side by side in vector lanes, shape (n,); the others run one by one."""
+        """True for each plant that runs in vector lanes, shape (n,); the others run one by one."""
         return np.array(self._core.side_by_side, dtype=np.bool_)
 
     @property
     def status(self) -> tuple[Failure | None, ...]:
-        """Why and when each plant ended, None for those that did not."""
+        """Reason and time of each plant's end, None for those that did not end."""
         return tuple(None if ended is None else Failure(*ended) for ended in self._core.status)
 
     @property

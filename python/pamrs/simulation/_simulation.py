@@ -30,7 +30,7 @@ from pamrs.simulation._driving import (
 
 
 class Event(NamedTuple):
-    """Something that happened between two samples.
+    """Event between two samples.
 
     Attributes
     ----------

@@ -55,18 +55,18 @@ class Table:
 
     @property
     def key(self) -> tuple[str, str]:
-        """Its file and, where a file has several tables, its name."""
+        """File of the log and, where the file has several tables, the name of this one."""
         return self.entries[0]["file"], self.entries[0].get("name", "")
 
     @property
     def roles(self) -> dict[str, str]:
-        """The roles that it can have."""
+        """Roles that the log can have, with their words."""
         several = len(self.item.pieces) >= _FEWEST_PARTS
         return {key: words for key, words in ROLES.items() if several or key != "parts"}
 
     @property
     def role(self) -> str:
-        """The role that it has."""
+        """Role that the log has."""
         return "parts" if len(self.entries) > 1 else str(self.entries[0].get("role", "fit"))
 
     def channel(self, column: str) -> tuple[str, dict[str, Any]]:
@@ -138,7 +138,7 @@ class Studio:
         return not any(self.folder.iterdir())
 
     def files(self) -> Iterator[Path]:
-        """Every file to be taken away: regular ones, not hidden, that lie in the folder."""
+        """Files of the folder for download: regular ones that are not hidden."""
         for home, folders, names in os.walk(self.folder):
             folders[:] = sorted(one for one in folders if not one.startswith("."))
             for name in sorted(names):
@@ -358,7 +358,9 @@ class Studio:
             self.run.cancel()
 
     def said_of_run(self) -> str:
-        """Why the last diagnosis of this page has no result; empty where it has, or goes on."""
+        """Reason for which the last diagnosis of this page has no result; empty where it has, or
+        goes on.
+        """
         return "" if self.run is None else self.said(self.run.error)
 
     def result_file(self, name: str) -> Path | None:

@@ -56,7 +56,7 @@ class Metric(NamedTuple):
         return " ".join([*squared, "s"]) + "".join(below)
 
     def given(self) -> tuple[Any, ...]:
-        """As ``simulate_batch`` takes it."""
+        """Metric in the form that ``simulate_batch`` takes."""
         if self.reduction != "squared_error":
             return self.reduction, self.channel
         varies = isinstance(self.reference, tuple)

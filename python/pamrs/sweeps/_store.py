@@ -54,13 +54,13 @@ class Entry(NamedTuple):
     first: tuple[int, str] | None
 
     def line(self) -> bytes:
-        """As a line of the journal, with a checksum before it."""
+        """Line of the journal, with a checksum before it."""
         text = json.dumps([self.chunk, self.runs, self.ended, self.first]).encode()
         return b"%08x %s\n" % (zlib.crc32(text), text)
 
     @classmethod
     def read(cls, line: bytes) -> Entry | None:
-        """A line of the journal; None where it was not written to its end."""
+        """Read a line of the journal; None where it was not written to its end."""
         sum_, _, text = line.rstrip(b"\n").partition(b" ")
         if not line.endswith(b"\n") or sum_ != b"%08x" % zlib.crc32(text):
             return None

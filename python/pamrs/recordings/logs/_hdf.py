@@ -65,8 +65,8 @@ def read_hdf(path: Path, form: TextFormat) -> Log:
 
 
 def _elsewhere(item: Any) -> str:
-    """Why a data set is not read whose numbers another file holds, or other data sets, which may
-    have them from there.
+    """Reason for which a data set is not read: another file, or other data sets that may lead to
+    one, hold its numbers.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def leads_elsewhere(group: Any) -> Iterator[tuple[str, str]]:
 
 
 def members(group: Any) -> Iterator[tuple[str, Any]]:
-    """Everything in a group and below it, once each, in the order of the names.
+    """Iterate over everything in a group and below it, once each, in the order of the names.
 
     Parameters
     ----------
