@@ -1,6 +1,4 @@
-"""Sets of effects that are tried: what each is, how it is fitted, and how it is judged on held-out
-recordings.
-"""
+"""Candidates: hypotheses fitted to recordings, and judged on those that were held out."""
 
 from __future__ import annotations
 
@@ -122,21 +120,19 @@ class Candidate:
 
     @cached_property
     def hypothesis(self) -> Hypothesis:
-        """What was fitted."""
+        """Hypothesis that its effects and wrong parameters are."""
         return Hypothesis(self.terms)
 
     def outside(self, walls: float) -> float:
-        """How far outside its tolerances what is wrong is: the logarithm of how many times the
-        walls, of each parameter.
-        """
+        """Sum of ``log(|moved| / walls)`` over its wrong parameters, each at least 0."""
         return sum(self.outside_of(name, walls) for name in self.wrong)
 
     def outside_of(self, name: str, walls: float) -> float:
-        """The same of one of its wrong parameters."""
+        """Distance of a wrong parameter beyond the walls: ``log(|moved| / walls)``, at least 0."""
         return math.log(max(1.0, abs(self.fit.moved[name]) / walls))
 
     def is_wrong(self, walls: float) -> bool:
-        """Whether everything that it calls wrong lies outside its tolerances, so many of them."""
+        """True where every parameter that it calls wrong moved by more than `walls` tolerances."""
         return all(abs(self.fit.moved[name]) > walls for name in self.wrong)
 
     @property
@@ -201,17 +197,15 @@ class BlockGroup:
 
 
 def significant(found: Excess, ratio: float = 1.0) -> bool:
-    """Whether a block's residual is significantly above the noise, and at least so many times its
-    noise level.
-    """
+    """True where a residual's variance is above its limit and so many times that of the noise."""
     return found.ratio > max(ratio, found.limit)
 
 
 def misses_only_held_out(
     inside: dict[str, Excess], after: dict[str, Excess], *, same: bool
 ) -> bool:
-    """Whether a fit leaves noise in its own recordings and more in held-out ones, which parameters
-    may bring that its own recordings do not tell (docs/decisions/0111).
+    """True where a fit leaves noise in its own recordings and more in held-out ones: parameters
+    that its own recordings do not determine may bring that (docs/decisions/0111).
     """
     quiet = not any(significant(e) for e in inside.values())
     return not same and quiet and any(significant(e) for e in after.values())
@@ -219,9 +213,7 @@ def misses_only_held_out(
 
 @dataclass(frozen=True, eq=False)
 class Attempts:
-    """What every attempt at an explanation needs: recordings to fit and held out, model, noise
-    levels, blocks with an excess.
-    """
+    """Fits of hypotheses to the recordings of one model, and their judgement as candidates."""
 
     inner: Problem
     outer: Problem
@@ -232,14 +224,12 @@ class Attempts:
 
     @property
     def settings(self) -> DiagnosisSettings:
-        """What they are made by."""
+        """Settings of the diagnosis."""
         return self.inner.settings
 
     @property
     def compared(self) -> list[Block]:
-        """Blocks by which hypotheses are compared: those with an excess, and others of their kind,
-        which an effect at every block of a kind may spoil.
-        """
+        """Blocks with an excess and others of their kind, by which hypotheses are compared."""
         kinds = {channel_of(b.name) for b in self.suspects}
         return [b for b in self.inner.blocks if channel_of(b.name) in kinds]
 
@@ -250,12 +240,12 @@ class Attempts:
 
     @property
     def white(self) -> dict[str, float]:
-        """Weights of noise without autocorrelation."""
+        """Weights of blocks whose noise has no autocorrelation: 1 for each."""
         return without_autocorrelation(self.inner.blocks)
 
     @cached_property
     def likelihood(self) -> Likelihood:
-        """By which hypotheses are weighed."""
+        """Likelihood of what a hypothesis leaves of all recordings, fitted and held out."""
         held_out = [] if self.same else self.outer.recordings
         recordings = [*self.inner.recordings, *held_out]
         return Likelihood(self.inner.blocks, recordings, self.noise_level)
@@ -263,15 +253,13 @@ class Attempts:
     def likelihood_of(
         self, inside: Mapping[Key, Residual], outside: Mapping[Key, Residual]
     ) -> Callable[[], Mapping[str, BlockLikelihood]]:
-        """How probable what a hypothesis leaves of fitted and of held-out recordings is, by block,
-        once it is asked for.
-        """
+        """Likelihood of a hypothesis's residuals by block, worked out when it is asked for."""
         found = inside if self.same else {**inside, **outside}
         return cache(partial(self.likelihood.of, found))
 
     @property
     def same(self) -> bool:
-        """Whether there is no held-out recording."""
+        """True where no recording is held out."""
         return self.outer.recordings is self.inner.recordings
 
     def autocorrelation(self, found: Fit) -> Weights:
@@ -279,17 +267,15 @@ class Attempts:
         return autocorrelation_of(self.inner, found, self.noise_level)
 
     def start_of(self, found: Fit, effect: Term) -> Start:
-        """Where another fit goes on from an effect as it was fitted."""
+        """Start of another fit from an effect as it was fitted."""
         return start_of(found, effect, LEAST_START)
 
     def starts_of(self, candidate: Candidate) -> list[Start]:
-        """Where another fit goes on from each effect of a hypothesis."""
+        """Starts of another fit from each effect of a candidate."""
         return [self.start_of(candidate.fit, effect) for effect in candidate.effects]
 
     def fit_events(self, effect: Term, beside: Candidate) -> Candidate | None:
-        """An effect with times of its own in every recording, held-out ones included, beside the
-        effects of a candidate.
-        """
+        """Fit an effect with times of its own in every recording, next to a candidate's effects."""
         if effect.id in {e.id for e in beside.effects}:
             return None  # it would replace what it is to happen beside
         if beside.fit.events is not None or beside.wrong:
@@ -329,9 +315,7 @@ class Attempts:
     def _refit_around_events(
         self, found: Fit, beside: Candidate, autocorrelation: dict[str, float]
     ) -> Fit:
-        """The persistent effects of a candidate fitted again, with the events that were found
-        beside them held.
-        """
+        """Refit the persistent effects of a candidate while the events are held."""
         assert found.events is not None
         effect = found.events.effect
         warm = replace(
@@ -354,15 +338,13 @@ class Attempts:
         )
 
     def excess(self, block: Block, problem: Problem, found: dict[Key, Residual]) -> Excess:
-        """What a block keeps of some recordings."""
+        """Excess over the noise of a block's residual in the recordings of a problem."""
         return excess(block, problem.recordings, found, self.noise_level, self.settings)
 
     def judge(
         self, effects: tuple[Term, ...], found: Fit, outside: dict[Key, Residual] | None = None
     ) -> Candidate:
-        """A fitted set on the held-out recordings, or on each recording as the others predict
-        it.
-        """
+        """Judge a fit on held-out recordings, or on each recording as the others predict it."""
         blocks = self.inner.blocks
         inside = {b.name: self.excess(b, self.inner, found.residuals) for b in blocks}
         if outside is None:
@@ -393,15 +375,15 @@ class Attempts:
         )
 
     def terms_of(self, effect: str) -> list[Term]:
-        """An effect everywhere, and at each place that the blocks tell from the others."""
+        """Terms of an effect: everywhere, and at each place that the blocks can distinguish."""
         places = places_of(self.nominal, effect, self.inner.blocks)
         return [Term(effect, at) for at in ("", *places)]
 
     def fit_effects(
         self, starts: list[Start], warm: Fit, autocorrelation: dict[str, float]
     ) -> Candidate | None:
-        """A set of effects fitted from one start of each, residuals weighted by their own
-        autocorrelation; None where it cannot be run.
+        """Fit effects from one start each, residuals weighted by their own autocorrelation; None
+        where the model cannot be run.
         """
         effects = tuple(start.effect for start in starts)
         if not self.held.isdisjoint(e.id for e in effects):
@@ -422,8 +404,8 @@ class Attempts:
     def fit_shortly(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
     ) -> Candidate | None:
-        """A set of effects fitted in a few steps, beside other values of some parameters: enough to
-        see which of many are worth a whole fit; None where it cannot be run.
+        """Fit effects and freed parameters in a few steps: enough to see which of many sets are
+        worth a whole fit; None where the model cannot be run.
         """
         effects = tuple(start.effect for start in starts)
         if not self.held.isdisjoint(e.id for e in effects):
@@ -436,9 +418,7 @@ class Attempts:
         return self._attempt((*effects, *wrong), found)
 
     def _attempt(self, terms: Iterable[object], work: Callable[[], Found]) -> Found | None:
-        """What an attempt at a hypothesis gives; None where it leaves the range in which the model
-        holds, or fails.
-        """
+        """Run an attempt at a hypothesis; None where it leaves the model's range or fails."""
 
         def inside() -> Found | None:
             try:
@@ -459,7 +439,7 @@ class Attempts:
         evaluations: int | None = None,
         share: float | None = None,
     ) -> Fit:
-        """Effects fitted from a start of each, with the baseline from where another fit left it and
+        """Fit effects from a start of each, with the baseline from where another fit left it and
         some parameters freed; the rest as in :func:`pamrs.diagnosis.fit.fit`.
         """
         free, held, forms = parts_of(starts)
@@ -482,10 +462,10 @@ class Attempts:
         return found
 
     def _fit_alone(self, names: tuple[str, ...]) -> Fit:
-        """Some parameters freed and fitted in a few steps with the others at their nominal values,
-        where they belong if these are the wrong ones.
+        """Fit freed parameters in a few steps from nominal values of all others.
 
-        From the nominal values a fit of all of them together is soon at the walls of the others.
+        The others belong there if these are the wrong ones; fitted freely from the start, they soon
+        reach their walls.
         """
         known = known_parameters(self.nominal)
         others = [n for n in free_baseline(self.inner, self.nominal) if n not in names]
@@ -501,8 +481,8 @@ class Attempts:
         )
 
     def fit_freed_shortly(self, names: tuple[str, ...]) -> Candidate | None:
-        """The baseline with some parameters freed, a few steps from where they go alone: enough to
-        see which of many are worth a whole fit.
+        """Fit the baseline with some parameters freed in a few steps, from where these go alone:
+        enough to see which of many are worth a whole fit.
         """
 
         def found() -> Candidate:
@@ -523,13 +503,12 @@ class Attempts:
     def fit_freed(
         self, names: tuple[str, ...], baseline: Fit, share: float | None = None
     ) -> Candidate | None:
-        """The baseline with some parameters freed from their tolerance, fitted to its end; None
-        where it cannot be run.
+        """Fit the baseline to its end with some parameters freed from their tolerance; None where
+        it cannot be run.
 
-        It begins where these go alone; and, where that leaves more than noise, at the values that
-        the baseline was moved to.
-        ``share`` is another share of the sum of squares than the usual one below which a step is
-        not worth it.
+        It begins where these go alone; and, where that leaves more than noise, at the values of the
+        baseline as well, of which the better one is taken. ``share`` is the share of the sum of
+        squares below which a step is not worth it, other than the usual one.
         """
         settings = self.settings
         least = FINAL_STEP_SHARE if share is None else share
@@ -568,9 +547,8 @@ class Attempts:
     def fit_together(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
     ) -> Candidate | None:
-        """A set of effects, each from a start, beside other values of some parameters, which are
-        freed from their tolerance; None where it cannot be run, or where these stay inside their
-        tolerances.
+        """Fit effects, each from a start, with some parameters freed from their tolerance; None
+        where the model cannot be run, or where these parameters stay inside their tolerances.
         """
         if not wrong:
             return self.fit_effects(starts, warm, self.white)
@@ -589,7 +567,7 @@ class Attempts:
         evaluations: int,
         share: float | None = None,
     ) -> Candidate:
-        """Effects fitted on from a fit, with some parameters freed."""
+        """Continue a fit of effects and freed parameters until its weights stop falling."""
         effects = tuple(start.effect for start in starts)
         weights, found = self.autocorrelation(warm), warm
         for _ in range(_MOST_WEIGHTINGS):
@@ -603,15 +581,11 @@ class Attempts:
         return replace(self.judge(effects, found), wrong=wrong)
 
     def _lighter(self, left: dict[str, float], weights: dict[str, float]) -> bool:
-        """Whether a fit leaves so much less autocorrelation than it was weighted by that it ended
-        before its end.
-        """
+        """True where a fit leaves much less autocorrelation than it was weighted by."""
         return any(CORRELATED_VARIANCE * now < weights[block] for block, now in left.items())
 
     def fit_united(self, candidates: list[Candidate]) -> Fit | None:
-        """One fit with everything that some hypotheses name, each for a block of its own; None
-        where it cannot be run.
-        """
+        """Fit all that several hypotheses name, each for its own block; None where it fails."""
         if any(c.fit.events is not None for c in candidates):
             return None
         starts = [start for c in candidates for start in self.starts_of(c)]
@@ -627,7 +601,7 @@ class Attempts:
         )
 
     def polish(self, candidate: Candidate) -> Candidate:
-        """A fitted set of persistent effects, fitted to its end.
+        """Fit a candidate's persistent effects to the end.
 
         The first fit ends where little is to be gained; of sets that nearly say the same the one
         that was left further from its end would lose.
@@ -650,9 +624,9 @@ def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:
 def autocorrelation_of(
     problem: Problem, found: Fit, noise_level: Mapping[Key, NoiseLevel]
 ) -> Weights:
-    """Weights of the autocorrelation that a fit leaves in each block, and at the least that of the
+    """Weights of the autocorrelation that a fit leaves in each block, at the least that of the
     noise: parameters that follow the noise of a drive leave too little of it. A recording that is
-    missed by far more than most counts by its own, so that it takes no weight from the others.
+    missed by far more than most has a weight of its own, so that it takes none from the others.
     """
 
     def noise_of(block: Block) -> float:
@@ -670,7 +644,7 @@ def autocorrelation_of(
 def parts_of(
     starts: Iterable[Start],
 ) -> tuple[dict[str, float], dict[str, float], dict[Term, str]]:
-    """Parameters of several effects that are free, those that are held, and the effects' forms."""
+    """Free parameters, held parameters and forms of several starts."""
     free: dict[str, float] = {}
     held: dict[str, float] = {}
     forms: dict[Term, str] = {}
@@ -682,7 +656,7 @@ def parts_of(
 
 
 def start_of(found: Fit, effect: Term, least: float) -> Start:
-    """Where another fit goes on from an effect as it was fitted, held parameters included.
+    """Start of another fit from an effect as it was fitted, held parameters included.
 
     ``least`` is the share of a typical size that a parameter has at the least.
     """
@@ -701,13 +675,13 @@ def start_of(found: Fit, effect: Term, least: float) -> Start:
 
 
 def _off_zero(name: str, value: float, share: float) -> float:
-    """A parameter to start from: one that a fit left at zero tells nothing of its scale."""
+    """Value to start a parameter from, at least a share of its typical size: zero has no scale."""
     least = share * _typical(name)
     return value if abs(value) > least else least
 
 
 def _typical(name: str) -> float:
-    """A typical size of an effect's parameter, at least its lower bound."""
+    """Typical size of an effect's parameter, at least its lower bound."""
     parameter = find_parameter(name)
     return max(
         parameter.default or parameter.starts[-1], parameter.lower, 1e-3 * parameter.starts[0]
@@ -715,10 +689,7 @@ def _typical(name: str) -> float:
 
 
 def _emptier_than_empty(problem: Problem, found: Fit) -> bool:
-    """Whether the pressures behind a gauge that reads late (what it reads and its lag times the
-    slope of that) lie below the ambient for a while, where nothing that was recorded does: such a
-    lag stands for how the chamber empties.
-    """
+    """True where a gauge's fitted lag implies pressures below ambient, and no recording has any."""
     for entry in found.rig.effects:
         if "reading" not in ports_of(entry) or Term.of(entry) not in found.effects:
             continue

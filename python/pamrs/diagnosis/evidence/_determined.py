@@ -1,4 +1,4 @@
-"""Names whose values the recordings do not determine, and names that are put aside."""
+"""Names whose values the recordings do not determine, and hypotheses that are taken out."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _DETERMINED_STDS = 1.0
 
 
 def with_stated_std(problem: Problem, group: BlockGroup, candidate: Candidate) -> Candidate:
-    """A fit with standard deviations that hold for residuals that are no noise; and, of what no
-    prior holds, for equations that are not quite the rig's.
+    """Candidate with the standard deviations that are reported: by how much pieces of the
+    recordings disagree, times ``spread_factor`` for parameters that no prior holds.
     """
     own, factor = replace(problem, blocks=group.blocks), problem.settings.spread_factor
     known = candidate.fit.held_by_prior
@@ -36,13 +36,12 @@ def with_stated_std(problem: Problem, group: BlockGroup, candidate: Candidate) -
 
 
 def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
-    """A group in which a name alone, whose values are not told from none (a wrong value: from one
-    inside its tolerances) by the standard deviations that are stated, has half of its probability;
-    a wrong value has none where no more than noise was left.
+    """Halve the probability of a single effect whose size is within one standard deviation of zero,
+    or of a single wrong value that may be inside its tolerances.
 
-    The rest falls to ``unlisted``: something acts there, and which effect was not told (to nothing,
-    where no more than noise was left). Whether a set needs such a name is told by the evidence of
-    the set without it.
+    The rest goes to ``unlisted``: something acts there, but not surely that. Where only noise was
+    left it goes to `UNDECIDED`, and a wrong value loses all. A set needs no such step: the evidence
+    of the set without the name decides.
 
     Parameters
     ----------
@@ -73,14 +72,14 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
 
 
 def is_outside(found: Fit, name: str, settings: DiagnosisSettings) -> bool:
-    """Whether a value is outside its tolerances by its stated standard deviation."""
+    """True where a fitted value is at least one standard deviation outside its tolerances."""
     walls = settings.most_tolerances
     return not value_may_be_inside(found, name, walls, _DETERMINED_STDS)
 
 
 def _has_undetermined_effect(candidate: Candidate) -> bool:
-    """Whether a set has an effect whose sizes, all together, are not told from none by its standard
-    deviations: with their shapes as uncertain as they are.
+    """True where all fitted sizes of an effect together are within one standard deviation of zero.
+    Effects with times of their own are left out: these times determine them.
 
     What happened at times of its own in single recordings is told by when it happened.
     """
@@ -107,9 +106,8 @@ def _has_undetermined_effect(candidate: Candidate) -> bool:
 
 
 def put_aside(group: BlockGroup, hypothesis: Hypothesis) -> BlockGroup:
-    """A group without one of its hypotheses: the others are as probable as they are where it is
-    known not to hold; ``unlisted`` where there is none, and nothing where no more than noise was
-    left.
+    """Remove a hypothesis from a group, and rescale the probabilities of the others to 1; where
+    none is left, all goes to ``unlisted``, or to `UNDECIDED` where only noise is left.
     """
     found = {h: p for h, p in group.probabilities.items() if h != hypothesis}
     total = sum(found.values())
@@ -122,5 +120,5 @@ def put_aside(group: BlockGroup, hypothesis: Hypothesis) -> BlockGroup:
 
 
 def _without_name(group: BlockGroup) -> Hypothesis:
-    """What is left where a name does not hold."""
+    """Answer without a name: `UNDECIDED` where only noise is left, else `UNLISTED`."""
     return UNDECIDED if group.mismatch is None else UNLISTED

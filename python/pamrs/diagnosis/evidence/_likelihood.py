@@ -1,6 +1,4 @@
-"""The likelihood by which hypotheses are weighed: what each leaves of the recordings as a Gaussian
-process of the sensors' noise, the error of the model, and an error that nobody states.
-"""
+"""Likelihood of residuals: a Gaussian process of noise, stated and unstated error of the model."""
 
 from __future__ import annotations
 
@@ -31,7 +29,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BlockLikelihood:
-    """How probable what a hypothesis leaves of a block is.
+    """Log density of what a hypothesis leaves of one block, by size of the unstated model error.
 
     Attributes
     ----------
@@ -63,8 +61,8 @@ class BlockLikelihood:
 
     @property
     def size(self) -> float:
-        """The most probable size, and what the curves of the model's error have to take beyond
-        what they are expected to; infinite where nothing is probable.
+        """Size of the unstated error: the most probable one or, if larger, the root of the power
+        that noise and stated error do not explain; infinite where nothing is probable.
         """
         best = int(self.by_size.argmax())
         if not math.isfinite(self.by_size[best]):
@@ -73,13 +71,13 @@ class BlockLikelihood:
         return max(float(self.sizes[best]), beyond)
 
     def expected(self, size: float) -> float:
-        """Logarithm of the density of rows that have an error of this size, and no more."""
+        """Log density that residuals with an unstated error of this size have on average."""
         return -0.5 * (self.count + float(np.interp(size, self.sizes, self.volume)))
 
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """The likelihood of some blocks and recordings.
+    """Likelihood of the residuals of some blocks and recordings.
 
     Bin means in units of their noise have the covariance ``1 + C C^T + r^2 K``: noise, the curves C
     of the model's error (the same in all recordings), and an error of the size r that nobody
@@ -102,7 +100,7 @@ class Likelihood:
     _lock: Lock = field(default_factory=Lock, repr=False)
 
     def of(self, found: Mapping[Key, Residual]) -> dict[str, BlockLikelihood]:
-        """How probable residuals are, by block."""
+        """Likelihood of residuals, by block."""
         return {block.name: self._of_block(block.name, found) for block in self.blocks}
 
     def _of_block(self, name: str, found: Mapping[Key, Residual]) -> BlockLikelihood:
@@ -125,7 +123,7 @@ class Likelihood:
     def _covariance(
         self, name: str, seen_in: list[tuple[Prepared, NDArray[np.intp]]]
     ) -> _Covariance:
-        """That of a block's bin means where they are usable."""
+        """Covariance of the usable bin means of a block."""
         times = [bins_of(p) * p.dt * seen.astype(np.float64) for p, seen in seen_in]
         levels = [self.noise_level[name, p.recording.name] for p, _ in seen_in]
         both = zip(levels, seen_in, strict=True)
@@ -146,13 +144,11 @@ class _Covariance:
         self._error_power = 1.0 + _CURVE_DEVIATIONS**2 * mean
 
     def _between(self, values: list[float]) -> Array:
-        """Values for each size worked out, for all those that are tried."""
+        """Interpolate values from the sizes that were worked out to all sizes that are tried."""
         return np.asarray(CubicSpline(np.log(_SIZES), values)(np.log(_BETWEEN)), dtype=np.float64)
 
     def likelihood(self, rows: list[Array]) -> BlockLikelihood:
-        """That of bin means, recording by recording; nothing is less probable than what is not
-        finite.
-        """
+        """Likelihood of bin means by recording; minus infinity where these are not finite."""
         count, power = sum(y.size for y in rows), sum(float(y @ y) for y in rows)
         if not math.isfinite(power):
             never = np.full(self._sizes.size, -math.inf)
@@ -167,7 +163,7 @@ class _Covariance:
 
 
 class _Sized:
-    """That covariance for one size.
+    """Covariance of a block's bin means for one size of the unstated error.
 
     In time the error is an Ornstein-Uhlenbeck process, whose inverse covariance is tridiagonal, so
     that all takes a time proportional to the number of bins.
@@ -212,8 +208,8 @@ class _Sized:
 
 
 def _inverse(times: Array) -> tuple[Array, float]:
-    """The inverse covariance of such a process of variance one at some times, as its diagonal and
-    the one below it (2, n), and the logarithm of the determinant of the covariance.
+    """Inverse covariance of an Ornstein-Uhlenbeck process of variance one at some times, as its
+    diagonal and the one below it (2, n), and the log determinant of the covariance.
     """
     kept = np.exp(-np.diff(times) / _ERROR_TIME)
     fresh = 1.0 - kept**2

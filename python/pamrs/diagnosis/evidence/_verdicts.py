@@ -1,4 +1,4 @@
-"""What each group of blocks says, beside what the others say, and what the case comes to.
+"""Verdicts of the groups of blocks, each given those of the others, and of the whole case.
 
 Groups of blocks are judged by themselves: what one keeps without a name says nothing of what
 another one has. Only an effect that acts in two groups ties them: it is one effect, so that its
@@ -110,9 +110,7 @@ def parameters_at_wall(group: BlockGroup) -> dict[str, float]:
 
 
 def _own(group: BlockGroup) -> dict[Hypothesis, float]:
-    """Probabilities of one group by itself, that of `UNDECIDED` divided between nothing missing and
-    parameters that moved.
-    """
+    """Probabilities of one group alone, with that of `UNDECIDED` divided among other answers."""
     found = {h: p for h, p in group.probabilities.items() if h != UNDECIDED}
     unchanged = group.probabilities.get(UNDECIDED, 0.0)
     if _leaves_little(group):
@@ -131,23 +129,21 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
 
 
 def _leaves_little(group: BlockGroup) -> bool:
-    """True where the refit leaves less of every block than what has no name would be told by."""
+    """True where the refit leaves less of every block than ``unlisted`` needs."""
     start = group.candidates[0]
     every = [*start.fitted.values(), *start.held_out.values()]
     return bool(every) and max(e.systematic for e in every) < _LEAST_UNLISTED
 
 
 def _is_unlikely(fit: Fit) -> bool:
-    """True where values inside their tolerances and starts of gases lie further from what is known
-    of them, together, than one in a hundred draws of them.
-    """
+    """True where moved parameters and starts of gases are rarer than one draw in a hundred."""
     moved = sum(abs(far) > 0.0 for far in fit.held_by_prior.values())
     starts = sum(found.strain > 0.0 for found in fit.residuals.values())
     return chi2.sf(fit.strain + fit.start_strain, max(1, moved + starts)) < _UNLIKELY
 
 
 def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Judged]:
-    """The verdict of every group, an effect that acts in several being judged once.
+    """Verdicts of all groups, an effect that acts in several being judged once.
 
     Parameters
     ----------
@@ -180,9 +176,7 @@ def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Jud
 
 
 def _capped(weights: dict[Hypothesis, float], most: float) -> dict[Hypothesis, float]:
-    """Weights of which names have at most this share together, however well several groups agree;
-    physics without a name has the rest.
-    """
+    """Cap the weights of all names together at a share of the total; `UNLISTED` gets the rest."""
     total = sum(weights.values())
     named = sum(w for h, w in weights.items() if h.terms)
     if named <= most * total:
@@ -201,11 +195,10 @@ def _in_several(own: Sequence[Mapping[Hypothesis, float]]) -> list[Term]:
 def _odds_shared(
     term: Term, holders: Sequence[tuple[BlockGroup, Candidate]], settings: DiagnosisSettings
 ) -> float:
-    """Odds of one name in several groups of blocks, each with a hypothesis that has it, to as many
-    names of which each happens to be there.
+    """Odds that one name acts in several groups of blocks, against a separate cause in each.
 
-    What is there once is paid for once: the dearest price stays, the others are given back. Where
-    the groups ask for other values, they are two.
+    One cause is paid for once: the dearest price stays, the others are given back. Where the groups
+    ask for different values, the odds are 1.
     """
     if len(holders) < 2 or not _same_values(term, [c for _, c in holders]):
         return 1.0
@@ -217,7 +210,7 @@ def _odds_shared(
 
 
 def _same_values(term: Term, candidates: Sequence[Candidate]) -> bool:
-    """Whether hypotheses give one term the same values, as far as each knows them."""
+    """True where all candidates give one term values that may be the same."""
 
     def same(parameter: str, *both: Candidate) -> bool:
         first, second = (c.fit.values[parameter] for c in both)
@@ -233,13 +226,13 @@ def _same_values(term: Term, candidates: Sequence[Candidate]) -> bool:
 
 
 def are_alike(first: float, second: float, std: float) -> bool:
-    """True where two values of one name may be the same, with the deviation of their difference."""
+    """True where two values differ by at most three standard deviations, or half of the larger."""
     known = _ALIKE_STDS * std, _ALIKE_SHARE * max(abs(first), abs(second))
     return abs(first - second) <= max(known)
 
 
 def _possible_together(terms: Sequence[Term]) -> bool:
-    """Whether different terms of several groups can hold at once."""
+    """True where no effect among the terms of several groups excludes another."""
     effects = [term for term in terms if term.is_effect]
     return not any(one.excluded_by(effects[k + 1 :]) for k, one in enumerate(effects))
 
@@ -252,9 +245,7 @@ def _normalised(weights: dict[Hypothesis, float]) -> dict[Hypothesis, float]:
 def _judged(
     group: BlockGroup, probabilities: dict[Hypothesis, float], settings: DiagnosisSettings
 ) -> Judged:
-    """The verdict: that of the most probable hypothesis; without a name only if no single name is
-    more probable than not.
-    """
+    """Judge a group by its likeliest hypothesis; unlisted only if no name exceeds ``named``."""
     start = group.candidates[0]
     named = {h: p for h, p in probabilities.items() if h not in WITHOUT_NAME}
     healthy = max(_HEALTHY, key=lambda h: probabilities.get(h, 0.0))
@@ -328,6 +319,6 @@ def _terms(hypotheses: Iterable[Hypothesis]) -> list[Term]:
 
 
 def _rest(hypotheses: Iterable[Hypothesis]) -> str:
-    """What is said without a name in some blocks: the worst."""
+    """Worst of the answers without a name; empty where no hypothesis gives one."""
     said = {hypothesis.rest for hypothesis in hypotheses}
     return next((h.rest for h in reversed(WITHOUT_NAME) if h.rest in said), "")

@@ -1,4 +1,4 @@
-"""Probabilities of sets of effects, and of ``unlisted``, by one evidence."""
+"""Probabilities of hypotheses, and of ``unlisted``, from one evidence."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ _MOST_RANGE_PRICE = 4.0
 
 @dataclass(frozen=True)
 class Weighing:
-    """What hypotheses are weighed by.
+    """Settings and limits by which hypotheses are weighed.
 
     Attributes
     ----------
@@ -97,17 +97,17 @@ def probability_cap(fitted: Problem, mismatch: Block, left: float, *, alone: boo
 def weigh(
     candidates: list[Candidate], suspects: list[Block], weighing: Weighing
 ) -> dict[Hypothesis, float]:
-    """Probabilities over sets of effects and ``unlisted`` (docs/decisions/0014).
+    """Probabilities of the hypotheses and of ``unlisted`` (docs/decisions/0014).
 
     One evidence for all: how probable each hypothesis makes the recordings, tempered, times its
     odds before any data. Recordings that are held out were not fitted, and count as the others do.
     The baseline as it is competes (`UNDECIDED`: nothing is missing, or parameters inside their
     tolerances are off), and so does `UNLISTED`: physics without a name leaves as large a share of
     the mismatch as a right name does. The right name may have been fitted badly, or in a form that
-    the catalogue lacks: then it leaves as much, and names share that chance as they weigh beside
-    each other, each as far as it takes the mismatch with values that its physics has. That a set
-    was missed is less probable than that a single name was, by the price of its further names. A
-    set with an effect whose size is not told from none names nothing.
+    the catalogue lacks: then it leaves as much, and names share that chance by their weights, each
+    as far as it takes the mismatch with values that its physics has. That a set was missed is less
+    probable than that a single name was, by the price of its further names. A set with an effect
+    whose size is not distinguished from zero names nothing.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def weigh(
 
 
 def _share_taken(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
-    """Share of the power of the baseline's error that a hypothesis takes."""
+    """Share of the power of the baseline's error that a hypothesis removes, 0 to 1."""
     before, after = (
         sum(found.likelihood()[b.name].size ** 2 for b in suspects)
         for found in (baseline, candidate)
@@ -156,9 +156,9 @@ def _share_taken(candidate: Candidate, baseline: Candidate, suspects: list[Block
 
 
 def _counted(candidates: list[Candidate], suspects: list[Block]) -> float:
-    """Share of the logarithm of evidence that counts (a power posterior): more, the nearer to noise
-    the hypothesis is that is nearest. Noise is independent from bin to bin, and what no hypothesis
-    explains is not.
+    """Share of the log evidence that counts (a power posterior): larger, the nearer the best
+    hypothesis is to noise. Noise is independent from bin to bin; what no hypothesis explains is
+    not.
     """
     powers = [[c.likelihood()[block.name].power for block in suspects] for c in candidates]
     left = min(max(own, default=1.0) for own in powers)
@@ -172,31 +172,30 @@ def log_weight(
     weighing: Weighing,
     share: float = _LEAST_SHARE,
 ) -> float:
-    """Logarithm of what a hypothesis weighs beside others, up to a constant: a share of its
-    evidence in some blocks, its price, how far parameters moved, and its values.
+    """Logarithm of a hypothesis's weight, up to a constant: a share of its evidence in some blocks,
+    less its price, its moved parameters and its rare values.
     """
     told = _evidence(candidate, baseline, suspects, share) - _strain(candidate)
     return told - price(candidate, weighing.settings) - _rarity(candidate, weighing)
 
 
 def _rarity(candidate: Candidate, weighing: Weighing) -> float:
-    """What a hypothesis loses by values that its physics hardly has."""
+    """Log odds that a hypothesis loses by values that its physics hardly has."""
     lost = loss_by_values(candidate)
     lost += _STANDING_PRICE * _lacks_drift(candidate, weighing.seconds)
     return lost + _UNSEEN_PRICE * _has_unseen_time(candidate, weighing.seconds)
 
 
 def _strain(candidate: Candidate) -> float:
-    """What a hypothesis loses by how far parameters moved, and how warm gases began."""
+    """Log odds that a hypothesis loses by moved parameters and by how warm gases began."""
     return 0.5 * _STRAIN_SHARE * (candidate.fit.strain + candidate.fit.start_strain)
 
 
 def _evidence(
     candidate: Candidate, baseline: Candidate, suspects: list[Block], share: float
 ) -> float:
-    """A share of the evidence of a hypothesis in some blocks, under the most probable size of the
-    error that nobody states: at most a part of what the hypothesis explains, more of it the less
-    probable.
+    """Share of a hypothesis's log evidence in some blocks, at the best size of the unstated error;
+    an error above a tenth of what the hypothesis explains costs more, the larger it is.
     """
     total = 0.0
     for name in (block.name for block in suspects):
@@ -211,7 +210,7 @@ def _evidence(
 
 
 def _log_weight_unlisted(baseline: Candidate, suspects: list[Block], share: float) -> float:
-    """What physics without a name weighs, as a right name would that explains all."""
+    """Log weight of physics without a name, as if a right name explained all."""
     total = 0.0
     for found in (baseline.likelihood()[block.name] for block in suspects):
         left = _LEAST_ERROR + _FORM_ERROR * found.size
@@ -220,21 +219,18 @@ def _log_weight_unlisted(baseline: Candidate, suspects: list[Block], share: floa
 
 
 def possible_gain(candidate: Candidate, suspects: list[Block]) -> float:
-    """By how much the logarithm of a set's weight could rise with something beside it, which left
-    nothing but noise.
-    """
+    """Largest rise of a candidate's log weight by an addition that leaves nothing but noise."""
     own = [candidate.likelihood()[block.name] for block in suspects]
     return _LEAST_SHARE * sum(max(0.0, found.expected(0.0) - found.most) for found in own)
 
 
 def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
-    """Share of the baseline's excess variance that a set of effects leaves in recordings that it
-    was not fitted to.
+    """Share of the baseline's excess variance that a set of effects leaves in held-out recordings.
 
-    Held-out recordings that hardly show the mismatch cannot say how much of it is left: those that
-    were fitted then do, and what an effect brings into the others, beyond what noise may, counts
-    beside it. What happens at times of its own was found in held-out recordings as in the others:
-    the larger share of the two counts.
+    Held-out recordings that hardly show the mismatch cannot say how much of it is left: the fitted
+    ones then do, and what an effect adds to the held-out ones, beyond what noise may, counts as
+    well. Events were found in held-out recordings as in the others: the larger share of the two
+    counts.
     """
     (was, now), (before, after) = _excesses(candidate, baseline, suspects)
     if candidate.fit.events is not None and min(was, before) > _TELLING_EXCESS:
@@ -262,7 +258,7 @@ def _excesses(
 
 
 def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> bool:
-    """Whether only noise is left, fitted and held out, where there was clearly more."""
+    """True where a candidate leaves only noise, fitted and held out, of what was clearly more."""
     quiet = not any(
         significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out)
     )
@@ -271,9 +267,9 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
 
 
 def is_absent(candidate: Candidate, walls: float) -> bool:
-    """Whether a wrong value of a set is not told from one inside its tolerances (so many of them),
-    or the sizes of an effect, taken together, are not told from none: a fit that goes on beside
-    such an effect may end lower, which is not the effect's doing.
+    """True where a wrong value may be inside its tolerances (`walls` of them), or all sizes of an
+    effect together may be zero, within two standard deviations. A fit that goes on with such an
+    effect may end lower without the effect's doing.
 
     Two sizes that do nearly the same may each be as uncertain as it is large, and their sum known
     well. The shape is taken as it was fitted: that of what is not there is anything.
@@ -300,7 +296,7 @@ def is_absent(candidate: Candidate, walls: float) -> bool:
 
 
 def fitted_sizes(found: Fit, effect: Term) -> list[str]:
-    """Parameters of an effect that were fitted and are zero where it is not there."""
+    """Fitted parameters of an effect that are zero where it is absent."""
     sealed = found.rig.model["valve"] is None
     form = effect.info.form(form_in(found.rig, effect))
     sizes = (p for p in form.parameters if p.role_in(sealed=sealed) == "size" and p.neutral == 0.0)
@@ -308,22 +304,20 @@ def fitted_sizes(found: Fit, effect: Term) -> list[str]:
 
 
 def is_near_none(distance: float, count: int, stds: float) -> bool:
-    """Whether so many sizes, at a squared distance from none, are as a single one within some
-    standard deviations of none.
+    """True where `count` sizes, at a squared distance from zero, are at least as likely to be zero
+    as one size at `stds` standard deviations.
     """
     return bool(chi2.sf(distance, count) >= chi2.sf(stds**2, 1))
 
 
 def may_be_inside(candidate: Candidate, walls: float, stds: float) -> bool:
-    """Whether a value that is called wrong may be inside its tolerances, so many standard
-    deviations off.
-    """
+    """True where a value called wrong is inside its tolerances or less than `stds` outside."""
     return any(value_may_be_inside(candidate.fit, name, walls, stds) for name in candidate.wrong)
 
 
 def value_may_be_inside(found: Fit, name: str, walls: float, stds: float) -> bool:
-    """Whether a fit has a value inside its tolerances (so many of them), or so many of its standard
-    deviations outside.
+    """True where a fitted value is inside its tolerances (`walls` of them), or less than `stds`
+    standard deviations outside.
     """
     wall = moved_value(found.known[name], math.copysign(walls, found.moved[name]))
     beyond = math.copysign(1.0, found.moved[name]) * (found.values[name] - wall)
@@ -331,9 +325,7 @@ def value_may_be_inside(found: Fit, name: str, walls: float, stds: float) -> boo
 
 
 def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
-    """Whether an effect of a set leaves the very recordings that another effect of the catalogue
-    would leave.
-    """
+    """True where an effect as fitted leaves the recordings that another effect would leave."""
     same = same_data_in(candidate.fit.rig, effect)
     if same is None:
         return False
@@ -353,9 +345,7 @@ def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
 
 
 def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
-    """Whether a time constant of a set was not seen: it is much longer than the recordings, or
-    not told from zero. What relaxes at once is another stiffness.
-    """
+    """True where a time constant is much longer than the recordings, or may be zero."""
     std = candidate.fit.std
     return any(
         value > _UNSEEN_LENGTHS * seconds or value < _SAME_STDS * std.get(name, 0.0)
@@ -365,9 +355,7 @@ def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
 
 
 def _lacks_drift(candidate: Candidate, seconds: float) -> bool:
-    """Whether a clock of a set does not drift: two free clocks drift, and a constant delay is a lag
-    or a dead time.
-    """
+    """True where a clock drifts by less than its offset: that is a lag or a dead time."""
 
     def at_rest(effect: Term, same: SameData) -> bool:
         size, telling = (
@@ -379,7 +367,7 @@ def _lacks_drift(candidate: Candidate, seconds: float) -> bool:
 
 
 def loss_by_values(candidate: Candidate) -> float:
-    """What a set loses by values that its physics hardly has.
+    """Log odds that a set loses by values that its physics hardly has.
 
     A parameter with a prior loses by its distance from it, as by a Cauchy distribution: a value of
     ten deviations is rare, but it does not rule out what explains a mismatch to its noise. Other
@@ -389,7 +377,7 @@ def loss_by_values(candidate: Candidate) -> float:
 
 
 def _loss_by_value(candidate: Candidate, name: str) -> float:
-    """What a set loses by the value of one parameter of an effect."""
+    """Log odds that a set loses by the value of one parameter."""
     lost, value = 0.0, candidate.fit.values[name]
     effect = effect_of(name)
     usual = usual_values(name, {effect: form_in(candidate.fit.rig, effect)} if effect else None)
@@ -407,9 +395,7 @@ def _loss_by_value(candidate: Candidate, name: str) -> float:
 
 
 def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
-    """What a set pays for its names, for the parameters of its effects (of events of one kind every
-    time and size), for the places where they could have been, and for a file that is wrong.
-    """
+    """Log odds paid for names, parameters, events, possible places, and wrong values."""
     own = sum(_own_price(candidate, term, settings) for term in candidate.terms)
     own += settings.further_price * len(candidate.terms) + candidate.places
     events = candidate.fit.events
@@ -418,9 +404,7 @@ def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
 
 
 def _own_price(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
-    """What a set pays for the parameters of one of its effects, or for how far a parameter of the
-    file is wrong.
-    """
+    """Log odds paid for an effect's parameters, or for how far a value of the file is wrong."""
     if term.id in candidate.wrong:
         return settings.wrong_price + candidate.outside_of(term.id, settings.most_tolerances)
     own = (n for n in candidate.fit.effect_values if effect_of(n) == term)
@@ -428,9 +412,7 @@ def _own_price(candidate: Candidate, term: Term, settings: DiagnosisSettings) ->
 
 
 def price_of_term(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
-    """What a set loses by one of its terms before any data: by what it pays for the term, its
-    values and its place.
-    """
+    """Log odds that a set loses by one term before any data: price, values and place."""
     own = _own_price(candidate, term, settings)
     if term.id in candidate.wrong:
         return own

@@ -1,4 +1,4 @@
-"""From judged hypotheses to an answer: where and when, in words, the model, its traces.
+"""Answer of a diagnosis from its judged hypotheses: location, times, words, model, traces.
 
 Public: `assemble`, `data_used`, `forms_of` (what has no name), `misread_diagnosis` (units first).
 """

@@ -153,7 +153,7 @@ def assemble(
 
 
 def answered(diagnosis: Diagnosis) -> Diagnosis:
-    """A diagnosis with the verdict and the probabilities that all of it comes to."""
+    """Diagnosis with its answer's verdict; if much is missed, none of it counts as healthy."""
     answer, chances = diagnosis.answer, diagnosis.probabilities
     if answer.missed:  # that nothing is missing is no answer any more
         healthy = sum(chances.get(key, 0.0) for key in HEALTHY)
@@ -164,7 +164,7 @@ def answered(diagnosis: Diagnosis) -> Diagnosis:
 
 
 def _picture(located: str | None, found: Conclusion, fitted: Problem) -> Picture:
-    """Where and when the block that the answer is about is off."""
+    """Conditions and times at which the answer's block is off; empty without such a block."""
     if located is None:
         return Picture()
     block = next(b for b in fitted.blocks if b.name == located)
@@ -182,16 +182,14 @@ def _worded(
     judged: list[Judged],
     forms: dict[str, str],
 ) -> Diagnosis:
-    """A diagnosis with its verdict in words."""
+    """Diagnosis with its verdict in words."""
     sought = any(j.group.sought for j in judged if j.verdict == "unlisted")
     told = list(dict.fromkeys(forms.values()))
     return replace(diagnosis, text=verdict_in_words(diagnosis, case, told, sought=sought))
 
 
 def _forms(models: Models, fitted: Problem) -> dict[str, str]:
-    """What a mismatch without a name is a function of, in words, by block, as the final model has
-    it.
-    """
+    """Sentences on the fitted form of a mismatch without a name, by block."""
     found: dict[str, str] = {}
     for judged, start, chosen in zip(models.judged, models.starts, models.chosen, strict=True):
         group = judged.group
@@ -204,7 +202,7 @@ def _forms(models: Models, fitted: Problem) -> dict[str, str]:
 
 
 def _tried(groups: list[BlockGroup]) -> list[Tried]:
-    """Every set of effects that was fitted, with what it leaves of each block's excess."""
+    """Every fitted set of effects, with what it leaves of each block's excess."""
     return [
         Tried(
             blocks=[b.name for b in group.blocks],
@@ -230,8 +228,8 @@ def _tried(groups: list[BlockGroup]) -> list[Tried]:
 
 
 def _considered(judged: list[Judged], fitted: Problem) -> list[Considered]:
-    """What of each set that the caller asked for acts where a mismatch is, by group of blocks, and
-    what it leaves; without blocks where nothing is missing in any.
+    """Probability and share left of each set that the caller asked for, by group of blocks with a
+    mismatch in which a term of it acts; without blocks where there is no such group.
     """
     found: list[Considered] = []
     for asked in fitted.considered:
@@ -360,7 +358,7 @@ def _wrong(
 
 
 def _events(effect: Term, candidate: Candidate) -> list[dict[str, Any]]:
-    """What happened in each recording, one entry for each event."""
+    """Events of an effect in each recording, one entry for each event."""
     events = candidate.fit.events
     if events is None or events.effect != effect:
         return []
@@ -412,9 +410,7 @@ _REFERENCE_DENSITY = 1.185
 
 
 def _emptying(effect: Term, candidate: Candidate) -> dict[str, EffectParameterFound]:
-    """How fast a conductance empties a sealed chamber, and what of it does not depend on the
-    chamber's volume.
-    """
+    """Time constant [s] of a sealed chamber emptying by a conductance; conductance per volume."""
     gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
     out: dict[str, EffectParameterFound] = {}
     for parameter in effect.info.form(form_in(candidate.fit.rig, effect)).parameters:
@@ -451,7 +447,7 @@ def _interval(value: float, std: float, lower: float) -> list[float]:
 def _parameters(
     nominal: Rig, candidates: list[Candidate], owners: dict[str, int]
 ) -> dict[str, ParameterFound]:
-    """Parameters of the baseline, each as the group has it that knows it best."""
+    """Parameters of the baseline, each from the group that determines it best."""
     out: dict[str, ParameterFound] = {}
     known = known_parameters(nominal)
     for name, k in owners.items():

@@ -1,6 +1,4 @@
-"""What is said of each group of blocks: verdict, names, and how large its mismatch is before and
-after.
-"""
+"""Entries of a result by group of blocks: verdict, names, mismatch before and after."""
 
 from __future__ import annotations
 
@@ -76,9 +74,7 @@ def block_entries(
 
 
 def _located(judged: Judged) -> str | None:
-    """The block of a group that has the mismatch; without one that of a value that is wrong, or at
-    the wall of its tolerance.
-    """
+    """Block with the mismatch of a group; else the last that a wrong or named term acts in."""
     group = judged.group
     if group.mismatch is not None:
         return group.mismatch.name
@@ -90,7 +86,7 @@ def _located(judged: Judged) -> str | None:
 
 
 def not_judged(block: Unjudged) -> BlockVerdict:
-    """The entry of a block that nobody can judge by these recordings."""
+    """Entry of a block that these recordings cannot judge."""
     return BlockVerdict(
         blocks=[block.name],
         verdict=NOT_JUDGED,
@@ -106,9 +102,7 @@ def not_judged(block: Unjudged) -> BlockVerdict:
 def _sizes(
     block: Block, problem: Problem, found: Stages, noise_level: dict[Key, NoiseLevel]
 ) -> MismatchStages:
-    """What is more than noise at every stage: in noise levels, in the channel's unit, and whether
-    noise could be so large.
-    """
+    """Excess of a block at every stage [noise levels, channel's unit], and if it is significant."""
     sizes = {}
     for stage, residuals in found.items():
         told = excess(block, problem.recordings, residuals, noise_level, problem.settings)
@@ -128,7 +122,7 @@ def unexplained(
     nominal: Rig,
     errors: Mapping[str, Mapping[str, ChannelError]],
 ) -> list[Unexplained]:
-    """Blocks with a mismatch beside what is named, or without a name, the largest first.
+    """Blocks with a mismatch that no name explains, the largest first.
 
     Parameters
     ----------
@@ -195,9 +189,7 @@ def _left(
     stages: list[tuple[Problem, Stages]],
     errors: Mapping[str, Mapping[str, ChannelError]],
 ) -> tuple[str, Problem, dict[Key, Residual], str] | None:
-    """The stage by which a block keeps something, and the recordings that show it with their role;
-    None where it is no more than noise.
-    """
+    """Stage, recordings, residuals and role that show what a block keeps; None if only noise."""
     # a form without a name takes up what no name explains, and is no explanation
     stage = "refit" if verdict == "unlisted" else "after"
     parts = {"held_out": own, "fit": replace(own, held_out=None)}
@@ -210,9 +202,7 @@ def _left(
 
 
 def _rest(block: str, terms: list[BudgetTerm]) -> tuple[float | None, list[float] | None]:
-    """Share of a block's excess that nothing with a name takes, and its interval; none where the
-    block has no budget.
-    """
+    """Share of a block's excess that no name takes, and its interval; None without a budget."""
     own = [t for t in terms if t.block == block]
     rest = [t for t in own if t.kind in ("form", "unexplained")]
     if not rest:
@@ -232,6 +222,6 @@ def _conditions(
     noise_level: dict[Key, NoiseLevel],
     nominal: Rig,
 ) -> list[Condition]:
-    """Under which conditions what is left is largest."""
+    """Conditions, at most six, under which the rest is larger than their time would explain."""
     picture = describe(block, problem.recordings, nominal, residual, noise_level)
     return [c for c in picture.conditions if c.share > TELLING_CONDITION * c.time][:6]

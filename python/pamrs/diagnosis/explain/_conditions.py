@@ -1,6 +1,4 @@
-"""Under which conditions a residual is large: shares, intervals in time, and a map over two
-conditions.
-"""
+"""Conditions under which a residual is large: their shares, and intervals in time."""
 
 from __future__ import annotations
 
@@ -22,7 +20,7 @@ from pamrs.units import with_unit
 
 @dataclass
 class Picture:
-    """Where a block's excess lies.
+    """Conditions and times at which a block has its excess.
 
     Attributes
     ----------
@@ -181,8 +179,8 @@ def describe(
 
 
 def _shares(regimes: dict[str, Mask], z: Array, *, rising: bool) -> list[Condition]:
-    """What of the excess each condition carries that none before it has, the most telling first: no
-    bin is counted twice, so that shares add up to at most all of it.
+    """Share of the excess that each condition carries and none before it has, the most telling
+    first: no bin is counted twice, so that shares add up to at most all of it.
     """
     excess = np.maximum(z**2 - 1.0, 0.0)
     total, found = float(np.sum(excess)), list[Condition]()
@@ -212,9 +210,7 @@ _ONE_SIDED = 0.5
 
 
 def _sign(z: Array, *, rising: bool) -> str:
-    """On which side of the model what was measured lies there, or whether it rises or falls against
-    it; a mean alone would hide what goes both ways.
-    """
+    """Words for the side of the model on which the measurement lies, or if it rises or falls."""
     mean, size = float(z.mean()), float(np.sqrt(np.mean(z**2)))
     if abs(mean) > max(_ONE_SIDED * size, 2.0 / math.sqrt(z.size)):
         words = ("falls against", "rises against") if rising else ("lies below", "lies above")

@@ -1,4 +1,4 @@
-"""Which recordings, samples and channels the answer rests on, and which were not used, and why."""
+"""Recordings, samples and channels that the answer rests on, and why others are not used."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def data_used(
     core: _core.Rig,
     unjudged: Sequence[Unjudged],
 ) -> list[RecordingUsed]:
-    """What of each recording the answer rests on.
+    """Samples and channels of each recording that the answer rests on.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def data_used(
 
 
 def _why(name: str, rig: Rig, core: _core.Rig, unjudged: Sequence[Unjudged]) -> str:
-    """Why a channel is not used."""
+    """Reason why a channel is not used."""
     kind, _, block = name.partition(".")
     if kind == "temperature" and name in core.channels and block not in thermometers_of(rig):
         why = _WITH_ANOTHER if block in warm_chambers(rig) else _WITHOUT_ENERGY

@@ -20,7 +20,7 @@ from pamrs.simulation import core_rig, default_step
 
 
 def forms_of(found: Fit, problem: Problem, baseline: Fit) -> list[Form]:
-    """What a fitted closure is a function of, by block.
+    """Dependence of a fitted closure on its variables, by block.
 
     The share of a kind of dependence is its inner product with the whole over that of the whole
     with itself, so that shares sum to one even where terms cancel.
@@ -204,7 +204,7 @@ def _formula(form: Form, used: dict[str, ClosureTerm], size: float) -> str:
 
 
 def _number(value: float) -> str:
-    """Three digits, and no power of ten where a person can do without."""
+    """Text of a number with three digits, without a power of ten below a million."""
     return f"{value:.0f}" if 999.5 <= value < 1e6 else f"{value:.3g}"
 
 

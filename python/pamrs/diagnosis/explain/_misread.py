@@ -1,6 +1,4 @@
-"""A diagnosis of recordings whose channels are in other units than their log says: that, and
-nothing else, in sentences.
-"""
+"""Diagnosis of recordings whose channels are in other units than their log says."""
 
 from __future__ import annotations
 
@@ -26,7 +24,7 @@ def misread_diagnosis(
     unjudged: Sequence[Unjudged],
     errors: Mapping[str, dict[str, ChannelError]],
 ) -> Diagnosis:
-    """The diagnosis of a case whose channels are to be read in another way.
+    """Diagnosis of a case whose channels are to be read in another unit.
 
     Parameters
     ----------
@@ -76,7 +74,7 @@ def misread_diagnosis(
 
 
 def misread_sentence(entry: Misread, unit: str) -> str:
-    """What is likely, and the evidence, in the unit of the log."""
+    """Sentence with the likely unit and its evidence, in the unit of the log."""
     names, many = listed(entry.channels), len(entry.channels) > 1
     verb = "are" if many else "is"
     if entry.offset:
@@ -103,7 +101,7 @@ def misread_sentence(entry: Misread, unit: str) -> str:
 
 
 def misread_advice(entry: Misread) -> str:
-    """What to do about it."""
+    """Sentence that says how to correct a wrong unit."""
     how = f"write {entry.likely}"
     if entry.likely == "absolute":
         how = "subtract the ambient pressure"

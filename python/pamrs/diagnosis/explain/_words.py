@@ -1,4 +1,4 @@
-"""Where the mismatch lies, and what a reader should know before trusting the rest, in words."""
+"""Sentences on where the mismatch lies, and warnings for the reader."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def where(
     picture: Picture,
     errors: dict[str, dict[str, ChannelError]],
 ) -> Where:
-    """The ``where`` entry: block, channel, intervals, conditions and a sentence, which has the
-    block's error of the table of ``errors`` that proves the answer.
+    """Entry ``where`` of a result: block, channel, intervals, conditions and a sentence, which has
+    the block's error of the table of ``errors`` that proves the answer.
     """
     groups, located = [j.group for j in judged], answer.block
     if located is None:
@@ -118,7 +118,7 @@ def _missing_there(block: Block, judged: list[Judged]) -> float:
 
 
 def left_out(case: Case, judged: list[Judged]) -> list[str]:
-    """Values that the rig file has as exactly nothing, beside named effects with the same law."""
+    """Warnings of values that are exactly 0 in the rig file while a named effect has their law."""
     named = [effect for j in judged for effect in j.named]
     return [
         f"{name} is exactly 0 in the rig file and would do nearly what {effect} does: write what "
@@ -136,7 +136,7 @@ def warnings(
     parameters: Mapping[str, ParameterFound],
     no_held_out: bool,
 ) -> list[str]:
-    """What a reader should know about the data and the fit."""
+    """Warnings about the data and the fit."""
     out = []
     groups = [j.group for j in judged]
     mistaken = any(j.wrong for j in judged)
@@ -200,7 +200,7 @@ def warnings(
 
 
 def absolute(case: Case) -> list[str]:
-    """Muscle pressures that begin at one atmosphere in every recording: they may not be gauge."""
+    """Warnings of muscle pressures that begin at one atmosphere in every recording."""
     ambient = float(case.rig.model["gas"]["ambient_pressure"])
     firsts, said = dict[str, list[float]](), dict[str, str]()
     for recording in case.recordings:
@@ -221,9 +221,7 @@ def absolute(case: Case) -> list[str]:
 
 
 def worse(table: dict[str, ChannelError]) -> list[str]:
-    """Channels that the model with what was added predicts worse than the nominal one did, or the
-    refitted one.
-    """
+    """Warnings of channels that the new model predicts worse than the nominal or refitted one."""
     out = []
     for channel in spoiled_channels(table):
         error = table[channel]
@@ -238,7 +236,7 @@ def worse(table: dict[str, ChannelError]) -> list[str]:
 
 
 def reservations(chosen: list[Candidate]) -> list[str]:
-    """Values that a model with a name had to move far."""
+    """Warnings of parameters that a fit with a named effect moved far."""
     named = [c for c in chosen if any(effect.id in CATALOGUE for effect in c.effects)]
     moved = {
         n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > _MOVED_TOLERANCES

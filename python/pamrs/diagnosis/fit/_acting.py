@@ -1,4 +1,4 @@
-"""Where effects act: in which rigs, and in which blocks of the cut chain."""
+"""Places where effects act: the rigs that can have them, and blocks of the cut chain."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ _CHANNELS = {
 
 
 def depends(block: Block, name: str) -> bool:
-    """Whether a block's output depends on a parameter, by its dotted name."""
+    """True where a block's output depends on a parameter, given by its dotted name."""
     effect = effect_of(name)
     return name in block.parameters if effect is None else acts_in(effect, block)
 
 
 def concerns(term: Term, block: Block) -> bool:
-    """Whether a block's output depends on an effect or a value of the rig file."""
+    """True where a block's output depends on an effect or a value of the rig file."""
     return acts_in(term, block) if term.is_effect else depends(block, term.id)
 
 
 def acts_in(effect: Term, block: Block) -> bool:
-    """Whether an effect acts inside a block of the cut chain: that of its own block of the rig,
-    unless it says others.
+    """True where an effect acts inside a block of the cut chain: that of its own block of the rig,
+    unless it names others.
 
     Of several tanks, chambers or joints an effect acts on every one, with the same parameters,
     where it has no place; with one (``leak_muscle@flexor``), on that block alone.
@@ -45,9 +45,7 @@ def acts_in(effect: Term, block: Block) -> bool:
 
 
 def _has(block: Block, kind: str, name: str) -> bool:
-    """Whether a block of the cut chain depends on one of several blocks of the rig: it is that
-    block, has parameters of it, or is driven by a channel of it.
-    """
+    """True where a block of the cut chain is, has parameters of, or is driven by a rig's block."""
     channels = {f"{channel}.{name}" for channel in _CHANNELS.get(kind, ())}
     return (
         block.name == f"{kind}.{name}"
@@ -57,8 +55,8 @@ def _has(block: Block, kind: str, name: str) -> bool:
 
 
 def places_of(rig: Rig, effect: str, blocks: Sequence[Block]) -> list[str]:
-    """Names of the blocks of a rig at each of which alone an effect may act, where some blocks of
-    the cut chain tell them apart; none where there are not two of them.
+    """Blocks of a rig at each of which alone an effect may act, by name, where the cut chain can
+    tell them from each other; empty where there are not two of them.
 
     Parameters
     ----------
@@ -83,7 +81,7 @@ def places_of(rig: Rig, effect: str, blocks: Sequence[Block]) -> list[str]:
 
 
 def _possible(rig: Rig, effect: str, at: str) -> bool:
-    """Whether a rig can have an effect at a block."""
+    """True where a rig can have an effect at a block."""
     try:
         rig.with_effect(effect, at=at)
     except ParameterError:
@@ -92,9 +90,7 @@ def _possible(rig: Rig, effect: str, at: str) -> bool:
 
 
 def core_names(rig: Rig, names: Sequence[str]) -> list[str]:
-    """Dotted names of parameters as the core has them: it says the place of an effect where a rig
-    has several of its id.
-    """
+    """Dotted names of parameters as the core has them: with a place where an id is there twice."""
     ids = [entry["id"] for entry in rig.effects]
 
     def named(name: str) -> str:
@@ -108,7 +104,7 @@ def core_names(rig: Rig, names: Sequence[str]) -> list[str]:
 
 
 def fits(rig: Rig, effect: str) -> bool:
-    """Whether a rig has what an effect acts on, and no uncertain parameter that says the same."""
+    """True where a rig has what an effect acts on, and no uncertain parameter for the same."""
     info = EFFECTS[effect]
     if info.stated_by:
         blocks = (split_name(name) for name, given in rig.parameters.items() if given.tol > 0.0)
@@ -118,14 +114,14 @@ def fits(rig: Rig, effect: str) -> bool:
 
 
 def same_data_in(rig: Rig, effect: Term) -> SameData | None:
-    """The effect that leaves the same recordings in a rig, held parameters only where they act."""
+    """Description of another effect that leaves the same recordings in a rig; None without one."""
     found = (s for s in effect.info.same_data if _acts_on(rig, EFFECTS[s.effect]))
     same = next(found, None)
     return same and replace(same, held=same.held if rig.tables(same.held_at) else ())
 
 
 def _acts_on(rig: Rig, info: EffectInfo) -> bool:
-    """Whether a rig has what an effect acts on."""
+    """True where a rig has a block of the kind that an effect acts on."""
     usual = info.at or ("joint" if info.block == "arm" else "chamber")
     return any(
         kind in ("", kind_of(block, table))

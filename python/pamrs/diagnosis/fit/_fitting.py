@@ -69,7 +69,7 @@ LOGARITHMIC = frozenset(
 
 
 def _logarithmic(name: str) -> bool:
-    """Whether a parameter is one of them, wherever its effect acts."""
+    """True where a parameter is fitted by its logarithm, wherever its effect acts."""
     effect = effect_of(name)
     return effect is not None and effect.id + name.removeprefix(str(effect)) in LOGARITHMIC
 
@@ -92,12 +92,12 @@ class Weights(dict[str, float]):
 
     @property
     def largest(self) -> float:
-        """That of the block, or of the recording, that counts least."""
+        """Largest variance of a block or single recording, which counts least."""
         return max([*self.values(), *self.apart.values()])
 
 
 class Unfollowed(SimulationError):
-    """A model that leaves the range in which it holds where one recording drives it.
+    """Error of a model that leaves the range in which it holds where one recording drives it.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Unfollowed(SimulationError):
 
 
 class Stopped(BaseException):
-    """Nobody waits for this work any more."""
+    """Signal that ends a fit whose result nobody waits for any more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +166,7 @@ class Events:
     form: str = ""
 
     def put_into(self, rig: Rig, recording: str) -> Rig:
-        """A rig with what happened in one recording, and without it where nothing did."""
+        """Rig with the events of one recording, and without the effect where nothing happened."""
         own = self.values.get(recording)
         rig = without_term(rig, self.effect)
         at = self.effect.at
@@ -227,7 +227,7 @@ class Fit:
 
     @property
     def held_by_prior(self) -> dict[str, float]:
-        """Baseline parameters that a prior holds, and how far each moved [tolerances]."""
+        """Baseline parameters that a prior holds, and the distance that each moved [tolerances]."""
         return {name: moved for name, moved in self.moved.items() if name not in self.freed}
 
     @property
@@ -243,12 +243,12 @@ class Fit:
 
     @property
     def strain(self) -> float:
-        """How far it had to leave the nominal values: the sum of squares of its priors."""
+        """Sum of squares of the priors: distance from the nominal values."""
         return sum(moved * moved for moved in self.held_by_prior.values())
 
     @property
     def start_strain(self) -> float:
-        """How unlikely the starts of gases are: the sum of squares of their priors."""
+        """Sum of squares of the priors on how warm gases begin."""
         return sum(r.strain for r in self.residuals.values())
 
 
@@ -307,7 +307,7 @@ def residuals(
 
 
 def _steps(rig: Rig, cores: Mapping[str, _core.Rig], names: Sequence[str]) -> dict[str, float]:
-    """By how much each parameter is shifted to whose value the core has no sensitivities."""
+    """Finite-difference step of each parameter to which the core has no sensitivities [SI]."""
     told, known = {n for core in cores.values() for n in core.parameter_names}, rig.parameters
     return {
         name: shift if known[name].value + shift <= known[name].upper else -shift
@@ -318,14 +318,14 @@ def _steps(rig: Rig, cores: Mapping[str, _core.Rig], names: Sequence[str]) -> di
 
 
 def _shift(known: Parameter) -> float:
-    """How far: a share of its tolerance; of one that is unknown, of its value."""
+    """Finite-difference step of a parameter."""
     if math.isfinite(known.tol):
         return _SHIFT_TOLERANCES * known.tol
     return _UNKNOWN_SHARE * abs(known.value) if known.value else _UNKNOWN_SHARE
 
 
 def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:
-    """What a function gives for each item, in their order, two at a time.
+    """Apply a function to each item, two at a time; results in the order of the items.
 
     For whole fits and simulations: steps of one that cannot be shared are done beside the other's.
     """
@@ -334,7 +334,7 @@ def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> l
 
 
 def _everywhere(problem: Problem, one: Callable[[Block, Prepared], Residual]) -> Residuals:
-    """What a function gives for every block and recording, two at a time.
+    """Apply a function to every block and recording, two at a time.
 
     The longest come first, so that no processor is left alone with one of them at the end.
     """
@@ -360,9 +360,7 @@ def _everywhere(problem: Problem, one: Callable[[Block, Prepared], Residual]) ->
 
 @contextmanager
 def _inside_range() -> Iterator[None]:
-    """A trial model that cannot be (more payload taken away than there is, next to no inertia) is
-    outside the model's range.
-    """
+    """Raise SimulationError for a trial model that cannot be, such as one with no inertia."""
     try:
         yield
     except (ParameterError, RigError) as error:
@@ -370,7 +368,7 @@ def _inside_range() -> Iterator[None]:
 
 
 def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
-    """Another model compiled; one so stiff that no fit could afford it is outside the range."""
+    """Compile another model; SimulationError where it is too stiff for any fit to afford."""
     with _inside_range():
         core = core_rig(rig, problem.core)
     least = min(_LEAST_STEP, _LEAST_STEP_SHARE * problem.core.stable_step)
@@ -500,8 +498,8 @@ def stacked(
 
 
 def predicted_with_doubt(problem: Problem, found: Fit) -> Residuals:
-    """Residuals of recordings that were not fitted, as far as what the fit leaves open of its
-    parameters cannot bring them.
+    """Residuals of recordings that were not fitted, without what the uncertainty of the fit's
+    parameters may explain of them.
 
     The prediction of a fit is as uncertain as its parameters are. They take the most probable
     values under both, by the fit's covariance and the sensitivities here, and what that movement
@@ -555,8 +553,8 @@ def changes(
     effect: Term,
     known: Mapping[Key, Residual] | None = None,
 ) -> Residuals:
-    """Residuals of a model near to another whose residuals (with the starts of their windows) are
-    known; values alone.
+    """Residuals, values alone, of a model close to one whose residuals (with the starts of their
+    windows) are known.
 
     Only blocks in which the effect that makes the difference acts are predicted again, but for
     those that are ``known``.

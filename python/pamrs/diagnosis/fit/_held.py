@@ -27,16 +27,12 @@ def _form(entry: Mapping[str, Any]) -> Form:
 
 
 def holdable(entry: Mapping[str, Any]) -> bool:
-    """Whether an effect of a model can be part of a baseline that all recordings share: a name of
-    the catalogue, in a form that acts all the time.
-    """
+    """True where an effect of a model can be part of a baseline that all recordings share."""
     return entry["id"] in CATALOGUE and not _form(entry).transient
 
 
 def without_passing(rig: Rig) -> Rig:
-    """A rig without the effects that no baseline can hold: what happens at times of its own in each
-    recording, and forms without a name.
-    """
+    """Rig without effects that no baseline can hold: events, and forms without a name."""
     for entry in rig.effects:
         if not holdable(entry):
             rig = rig.without_effect(entry["id"], at=entry.get("at", ""))
@@ -102,7 +98,7 @@ _LEAST_RATIO = 1e-3  # share of its nominal value that a positive parameter has 
 
 
 def _is_positive(known: Parameter) -> bool:
-    """Whether a parameter is a positive quantity: below its value its tolerance is a factor."""
+    """True where a parameter is a positive quantity: below its value its tolerance is a factor."""
     return known.lower >= 0.0 < known.value
 
 

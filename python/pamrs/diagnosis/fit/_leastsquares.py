@@ -74,7 +74,7 @@ def levenberg_marquardt(
     low, high = bounds
 
     def evaluated(x: Array) -> tuple[tuple[Array, Array, T], Array, Array]:
-        """What there is at a point, and its normal equations."""
+        """Evaluate a point and form its normal equations."""
         found = evaluate(x)
         rows, jacobian, _ = found
         # squares that overflow, or will, are outside the range as much as what is no number

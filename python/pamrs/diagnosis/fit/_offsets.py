@@ -1,4 +1,4 @@
-"""When commands acted: a part of a sample earlier or later than their log has them.
+"""Offsets of commands: parts of a sample by which they acted earlier or later than logged.
 
 A log that runs by itself beside the loop sees a command at its next sample, and a loop may send it
 after the sensors were read. What that does to a pressure is neither a lag nor a value of the rig;
@@ -50,7 +50,8 @@ class _Change(NamedTuple):
 
 
 def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Problem], list[str]]:
-    """Recordings whose commands begin to act when they did, as far as that is less than a sample.
+    """Move the commands of recordings to the time at which they began to act, as far as that is
+    less than a sample.
 
     How much later they act is fitted for each recording together with the parameters inside their
     tolerances, by the blocks that a command drives. Only an offset that is told from none counts,
@@ -113,8 +114,8 @@ def _near(problem: Problem, blocks: Sequence[Block], nominal: Rig) -> Rig:
 def _that_pay(
     first: Problem, whole: Problem, near: Rig, moved: dict[int, Prepared]
 ) -> dict[int, Prepared]:
-    """Those of the moved recordings of which a fit with them leaves less than one without, and
-    little but noise: where something else is missing, an offset takes a part of that.
+    """Moved recordings of which a fit leaves less than unmoved, and little but noise: where
+    something else is missing, an offset takes a part of that.
     """
     there = {whole.recordings[k].recording.name: p for k, p in moved.items()}
     fitted = [there.get(p.recording.name, p) for p in first.recordings]
@@ -130,7 +131,7 @@ def _that_pay(
 
 
 def _missed(problem: Problem, rig: Rig) -> list[tuple[float, int]]:
-    """Of each recording the sum of squares of what it misses, in noise levels, and their number."""
+    """Sum of squares of each recording's residuals in noise levels, and their number."""
     found, sums = residuals(problem, rig, []), []
     for prepared in problem.recordings:
         own = [found[block.name, prepared.recording.name] for block in problem.blocks]
@@ -146,9 +147,7 @@ def _changes(prepared: Prepared) -> Rows:
 
 
 def _later(prepared: Prepared, shares: Array) -> Prepared:
-    """A recording each of whose changes of a command acts such a share of a sample of the log
-    later.
-    """
+    """Recording whose changes of a command act given shares of a sample of the log later."""
     at = _changes(prepared)
     size = next(iter(prepared.held.values())).size
     seldom = at.size * _OFFSET_FEW_PARTS < size
@@ -163,8 +162,8 @@ def _later(prepared: Prepared, shares: Array) -> Prepared:
 
 
 def _moved_alike(problem: Problem, nominal: Rig) -> tuple[dict[int, Prepared], dict[int, float]]:
-    """Recordings, by their numbers, with all commands moved alike, and by what share of a sample;
-    those alone in which that is told from none.
+    """Recordings, by number, with all commands moved alike, and that share of a sample; only those
+    in which it is distinguished from zero.
     """
     all_of = [
         _Change(k, np.arange(at.size))
@@ -199,8 +198,8 @@ def _moved_each(problem: Problem, nominal: Rig, those: list[int]) -> dict[int, P
 
 
 def _fitted(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[Array, Array]:
-    """Offsets in samples of the log, and their standard deviations: of a fit that is linear, with
-    the parameters inside their tolerances beside them.
+    """Offsets in samples of the log, and their standard deviations, by a linear fit together with
+    the parameters inside their tolerances.
     """
     names = free_baseline(problem, nominal)
     known = known_parameters(nominal)

@@ -1,6 +1,4 @@
-"""Where the fit of a vibration begins: frequencies that stand out of the residual's spectrum, and
-the sizes (and so the phases) that each recording asks for.
-"""
+"""Start of the fit of a vibration: lines of the residual's spectrum, and sizes by recording."""
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ _MOST_LINES = 5
 
 @dataclass(frozen=True, eq=False)
 class Shaken:
-    """What a vibration of each of some frequencies does to the residuals of each recording.
+    """Change of each recording's residuals by a vibration of each of some frequencies.
 
     Attributes
     ----------
@@ -50,7 +48,7 @@ class Shaken:
         inflation: dict[str, float],
         known: Mapping[str, float] | None = None,
     ) -> Shaken:
-        """Signatures at a model that stays.
+        """Signatures of vibrations about a model that stays as it is.
 
         Parameters
         ----------
@@ -114,9 +112,7 @@ class Shaken:
         return Events(self.effect, {n: {p: v[p] for p in order} for n, v in values.items()}, form)
 
     def _columns(self, lines: tuple[float, ...], name: str) -> Array:
-        """What a unit of each size does to the residuals of a recording, in the order of the
-        lines.
-        """
+        """Change of a recording's residuals per unit of each size, in the order of the lines."""
         return np.concatenate([self.columns[line][name] for line in lines], axis=1)
 
     def _solved(self, lines: tuple[float, ...], name: str) -> Array:
@@ -125,7 +121,7 @@ class Shaken:
         return np.asarray(np.linalg.lstsq(columns, -self.rows[name], rcond=1e-9)[0])
 
     def _gain(self, lines: tuple[float, ...]) -> float:
-        """What these lines take of the sum of squares of all recordings."""
+        """Reduction of the sum of squares of all recordings by some lines."""
         gain = 0.0
         for name, rows in self.rows.items():
             left = rows + self._columns(lines, name) @ self._solved(lines, name)
@@ -161,7 +157,7 @@ def _lines(
 def lines_of(
     found: Iterable[tuple[Residual, float]], low: float, high: float, most: int
 ) -> list[float]:
-    """Frequencies at which the spectrum of residuals stands out most from its surroundings.
+    """Frequencies at which the spectrum of residuals exceeds its surroundings most.
 
     Parameters
     ----------

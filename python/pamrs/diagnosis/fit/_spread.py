@@ -74,8 +74,8 @@ def pieces_spread(rows: Array, jacobian: Array, covariance: Array, pieces: list[
 
 
 def _pull(root: Array, jacobian: Array, rows: Array) -> Array:
-    """How far a piece pulls the scaled parameters; what it decides itself (its leverage) has made
-    its residuals smaller, and is put back.
+    """Pull of a piece on the scaled parameters; its residuals, which its own leverage made smaller,
+    are scaled up again (CR2).
     """
     share, axes = np.linalg.eigh(root @ (jacobian.T @ jacobian) @ root)
     leverage = np.sqrt(np.maximum(1.0 - share, np.finfo(float).eps ** 0.5))

@@ -1,6 +1,4 @@
-"""Where the fit of an effect begins: sizes that scale, shapes that are tried one by one, choices
-that are held.
-"""
+"""Starts of the fit of an effect: sizes that scale, shapes to be tried, choices that are held."""
 
 from __future__ import annotations
 
@@ -46,12 +44,12 @@ class Start:
 
     @property
     def scalable(self) -> bool:
-        """Whether a number scales the effect."""
+        """True where the effect has sizes that a factor scales."""
         return bool(self.sizes)
 
     @property
     def kind(self) -> tuple[str, frozenset[tuple[str, float]]]:
-        """Its form, and what is chosen in it."""
+        """Form of the start, and its held parameters."""
         return self.form, frozenset(self.held.items())
 
     def applied(self, rig: Rig) -> Rig:
@@ -60,7 +58,7 @@ class Start:
         return rig.with_effect(self.effect.id, values, at=self.effect.at, form=self.form)
 
     def moved(self, effect: Term) -> Start:
-        """The same start of the effect at another place."""
+        """Start with the effect moved to another place."""
 
         def named(name: str) -> str:
             return f"{effect}{name.removeprefix(str(self.effect))}"
@@ -74,9 +72,7 @@ class Start:
         )
 
     def scaled(self, size: float) -> Start:
-        """The same start with its sizes multiplied (a restriction divided by the root), inside
-        their bounds.
-        """
+        """Start with its sizes multiplied (a restriction by the inverse root), inside bounds."""
         bounds = {f"{self.effect}.{p.name}": p for p in self.effect.info.form(self.form).parameters}
 
         def sized(name: str, value: float) -> float:
@@ -101,7 +97,7 @@ def entry_of(rig: Rig, effect: Term) -> dict[str, Any]:
 
 
 def _is(effect: Term, entry: Mapping[str, Any]) -> bool:
-    """Whether an entry of a rig is of an effect: with its place, or anywhere."""
+    """True where an entry of a rig is of an effect: at its place, or anywhere without one."""
     return effect.id == entry["id"] and effect.at in ("", entry.get("at", ""))
 
 

@@ -113,7 +113,7 @@ def _scale(effect: Term, parameter: str) -> float:
 def fit_events(
     effect: Term, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
 ) -> Fit | None:
-    """Find the events of an effect in every recording and refit the baseline beside them.
+    """Find the events of an effect in every recording and refit the baseline with them.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def fit_events(
 
 
 def _in_form(events: Events, form: str) -> Events:
-    """Events in another form: what the forms share stays, and what comes over a time of its own
+    """Events in another form: shared parameters stay, and an event that takes a time of its own
     begins half of it earlier.
     """
     effect = events.effect
@@ -192,7 +192,7 @@ def look_for_events(
     known: Mapping[str, float] | None = None,
     form: str = "",
 ) -> Events | None:
-    """The events of an effect in each recording, at a model that stays.
+    """Find the events of an effect in each recording, with the rest of the model held.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def look_for_events(
     )
 
     def begun_in(alone: Problem, prepared: Prepared) -> Events | None:
-        """Where the events of one recording begin, in the form that is asked for."""
+        """Start of the events of one recording, in the form that is asked for."""
         name = prepared.recording.name
         if periodic:
             return None if shaken is None else replace(shaken, values={name: shaken.values[name]})
@@ -266,8 +266,8 @@ def _drifting(
     inflation: dict[str, float],
     known: Mapping[str, float] | None = None,
 ) -> Events | None:
-    """Sizes of an effect that is another one in each recording, by its signature in each; without
-    those in which it is not worth it, None where it is in none.
+    """Sizes of an effect whose size differs between recordings, by its signature in each; without
+    recordings in which it is not worth it, None where it is in none.
     """
     info, values = effect.info, {}
     leading = info.leading
@@ -303,9 +303,7 @@ def _scan(
     size: float | None,
     stopped: Event,
 ) -> dict[str, float]:
-    """Where the events of one recording begin, the most telling first; empty where none is worth
-    it.
-    """
+    """Find where the events of one recording begin, the most telling first; empty without any."""
     slots = len(events_of(effect))
     typical = _tried(effect.info.leading)
     length = prepared.n * prepared.dt
@@ -448,8 +446,8 @@ def _limits(effect: Term, parameter: str, prepared: Prepared) -> tuple[float, fl
 def _jointly(
     events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
 ) -> Fit | None:
-    """Baseline and events of every recording in one fit, a changed mass the same in all; None where
-    the model leaves its range.
+    """Fit baseline and events of every recording together, a changed mass being the same in all;
+    None where the model leaves its range.
 
     One after the other would creep: a baseline that was fitted without the events holds half of
     what a mass does.
@@ -547,7 +545,7 @@ class _Joint:
         return _Joint(events, problem, inflation, names, scaling, places, scale, kept)
 
     def told(self, x: Array) -> Events:
-        """The events that a vector says."""
+        """Events that the elements of a vector stand for."""
         values = {name: dict(own) for name, own in self.events.values.items()}
         for (name, p), value in zip(self.places, x[len(self.names) :] * self.scale, strict=True):
             for own in values.values() if name == "" else [values[name]]:
@@ -582,7 +580,7 @@ class _Joint:
         return np.concatenate([*parts, x[:count]]), np.concatenate([*columns, prior]), found
 
     def begin(self, baseline: Fit) -> Array:
-        """Where the fit begins: the baseline as it was, each event where it was found."""
+        """Vector where the fit begins: the baseline as it was, each event where it was found."""
         start = [
             (baseline.values[n] - self.scaling.centre[n]) / self.scaling.scale[n]
             for n in self.names
