@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class _Along:
-    """All recordings in a row.
+    """Missing input and its arguments, all recordings one after the other.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class _Along:
         return cls(value, weight, arguments, np.concatenate(folds), which)
 
     def fitted(self, columns: Array, rows: NDArray[np.bool_]) -> Array:
-        """A function of some columns (n, k), from some rows, at all of them."""
+        """Fit a linear function of columns (n, k) to some rows; its values (n,) at all rows."""
         weighted = columns[rows] * self.weight[rows, None]
         ridge = _SMOOTHING_RIDGE * float(np.sum(self.weight[rows])) / columns.shape[1]
         normal = weighted.T @ columns[rows] + ridge * np.eye(columns.shape[1])
@@ -85,7 +85,7 @@ class _Along:
         return found
 
     def told(self, columns: Array) -> float:
-        """Share of the input's square that a function tells of stretches it was not fitted to."""
+        """Share of the input's square that a function predicts in stretches not fitted to."""
         guess = np.empty_like(self.value)
         for k in range(_FOLDS):
             inside = self.fold == k
@@ -180,7 +180,7 @@ def _clearest(
 
 
 def with_words(found: MissingInput) -> MissingInput:
-    """Tell what a missing input depends on, and when it acts where that is at some times alone.
+    """Describe what a missing input depends on, and when it acts if that is at some times alone.
 
     Parameters
     ----------
@@ -217,8 +217,8 @@ def _during(own: MissingRecording, time: MissingTime) -> MissingRecording:
 
 
 def _explained(found: MissingInput) -> tuple[str, float, str]:
-    """Argument that tells most of an input (``time`` for a steady one, empty where no single one
-    does), the share of its square that a function of it tells, cross-validated, and a sentence.
+    """Argument that explains most of an input (``time`` for a steady one, empty where no single one
+    does), the share of its square that a function of it explains, cross-validated, and a sentence.
     """
     along = _Along.of(found.recordings, [*found.units])
     candidates = _candidates(along, found.position, found.rate)
@@ -247,9 +247,7 @@ def _explained(found: MissingInput) -> tuple[str, float, str]:
 
 
 def _taken(found: MissingInput, along: _Along) -> str:
-    """How much of an input's square the named effects take, in words; empty where they take less
-    than an argument would that explains it.
-    """
+    """Words on the share of an input's square that named effects take; empty where it is small."""
     laws = [own.law for own in found.recordings if own.law is not None]
     if len(laws) < len(found.recordings):
         return ""
@@ -280,7 +278,7 @@ def _sense(found: MissingInput, mean: float) -> str:
 
 
 def _sentence(found: MissingInput, along: _Along, name: str, fit: Array) -> str:
-    """The input as a function of one argument."""
+    """Sentence on the input as a function of one argument."""
     rate = along.arguments[found.rate]
     every = along.weight > 0.0
     if name == found.rate:

@@ -193,7 +193,7 @@ class _Windows:
         return heights, std
 
     def improve(self, steps: int) -> None:
-        """Steps of Gauss and Newton, of each window as long as they bear fruit."""
+        """Make Gauss-Newton steps in each window as long as they pay."""
         length = np.ones(len(self.starts))
         for step in range(steps):
             before = self.left(self.means)
@@ -216,14 +216,14 @@ class _Windows:
                 self.take(k, tried, means, response)
 
     def take(self, k: int, heights: Array, means: Array, response: Array) -> None:
-        """Take over what another run has of one window."""
+        """Copy heights, residual and response of one window from another run."""
         own, rows = self.knots[k], self.bins[k]
         self.heights[own] = heights[own]
         self.means[rows], self.response[rows] = means[rows], response[rows]
 
 
 def _nothing(time: Array) -> Array:
-    """No input."""
+    """Input that is zero at all times."""
     return np.zeros_like(time)
 
 

@@ -58,7 +58,7 @@ def missing_input_of(
     named: _core.Rig | None = None,
     margin: float = 1.1,
 ) -> MissingInput | None:
-    """Reconstruct the missing input of a block along all recordings, and tell what it depends on.
+    """Reconstruct the missing input of a block along all recordings, and what it depends on.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def _followed(
 def _told(
     block: Block, told: list[MissingRecording], parts: list[Reconstruction], margin: float
 ) -> MissingInput:
-    """The whole with what it depends on, in words."""
+    """Missing input along all recordings, with words on what it depends on."""
     bins = [own.bins for own in parts]
     before, after = (
         float(np.average([getattr(own, n) for own in parts], weights=bins))

@@ -1,5 +1,4 @@
-"""When a residual is more than noise: noise levels with the noise of the drives, excess over them,
-autocorrelation.
+"""Noise levels with the noise of the drives, excess of residuals over them, autocorrelation.
 
 Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `means_in_noises`,
 `model_error`, `error_sizes`, `with_sizes`, `correlation_time`, `inflation`, `apart`.

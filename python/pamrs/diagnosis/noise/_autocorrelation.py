@@ -1,4 +1,4 @@
-"""How far residuals remember: autocorrelation time, and what it makes of their weight."""
+"""Autocorrelation time of residuals, and the weight that they have by it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def inflated(values: Array, rows: NDArray[np.bool_], width: int, noise: float) -
 def _inflations(
     block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
 ) -> dict[Key, float]:
-    """That of a block in each recording that has a sample of it."""
+    """Inflation (as of `inflated`) of a block in each recording that has a sample of it."""
     widths = {(block.name, p.recording.name): bin_width(p, width) for p in recordings}
     values = {
         key: inflated(found[key].value, found[key].rows, count, found[key].noise)
@@ -54,7 +54,7 @@ def _inflations(
 
 
 def _most(values: dict[Key, float]) -> float:
-    """What recordings keep that are as usual; of an even number, by the lower one in the middle."""
+    """Largest inflation that counts as usual: 100 times the lower median, or 100; 0 of none."""
     seen = sorted(values.values())
     return _APART * max(1.0, seen[(len(seen) - 1) // 2]) if seen else 0.0
 
@@ -63,7 +63,7 @@ def inflation(
     block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
 ) -> float:
     """Variance of a block's bin means relative to white sample noise, times their correlation time
-    (>= 1), but for the recordings that stand apart.
+    (>= 1), without recordings that are far above the others.
     """
     values = _inflations(block, recordings, found, width)
     seen = [value for value in values.values() if value <= _most(values)]
@@ -73,6 +73,6 @@ def inflation(
 def apart(
     block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
 ) -> dict[Key, float]:
-    """The same of each recording in which it is by far larger than in half of them."""
+    """Inflation of each recording in which it is far larger than in half of them."""
     values = _inflations(block, recordings, found, width)
     return {key: value for key, value in values.items() if value > _most(values)}

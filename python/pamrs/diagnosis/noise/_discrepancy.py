@@ -1,4 +1,4 @@
-"""The error that a rig file says its model has, as curves: what each can do to a block's output."""
+"""Error that a rig file states for its model, as curves: the change of a block's output by each."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def model_error(rig: Rig, usual: float) -> Stated:
 
 
 def operating_ranges(block: Block, recordings: list[Prepared]) -> OperatingRanges:
-    """What all recordings visit of each signal at a block."""
+    """Least value and width of each signal at a block, over all recordings [SI]."""
     found = {}
     for name in (block.channel, *block.drives):
         there = [v for p in recordings if (v := _signal(p, name)) is not None]
@@ -169,7 +169,7 @@ def _shares(stated: Stated, kinds: tuple[str, ...], own: str | None = None) -> f
 
 
 def _flow_errors(block: Block, ranges: OperatingRanges, stated: Stated) -> list[tuple[str, float]]:
-    """Over what an error of the flow into a block is a curve, and its share."""
+    """Signals over which errors of the flow into a block are curves, each with its share."""
     if block.kind not in _FLOWS or block.channel not in ranges:
         return []
     own = block_of(block.channel)
@@ -184,8 +184,8 @@ def _flow_errors(block: Block, ranges: OperatingRanges, stated: Stated) -> list[
 def _drive_errors(
     block: Block, prepared: Prepared, ranges: OperatingRanges, stated: Stated
 ) -> list[tuple[str, str, Array]]:
-    """Which drive is off, over what its error is a curve, and how much [SI]: the reading itself,
-    and the force that a pressure stands for.
+    """Errors of drives: the drive, the signal over which its error is a curve, and its size [SI];
+    of the reading itself, and of the force that a pressure makes.
     """
     around = (block.channel, *block.drives)
     motion = next((n for n in around if channel_of(n) in _MOTION and n in ranges), None)
@@ -204,8 +204,8 @@ def _drive_errors(
 
 
 def _flowing(shares: Array, base: Residual) -> Array:
-    """What shares of all that changes an output do to it (a column each); how fast they fade is
-    told by what a window's start does.
+    """Change of an output by shares of all that changes it (a column each), which fades as the
+    effect of a window's start does.
     """
     steps = np.append(np.diff(base.prediction), 0.0)[:, None] * shares
     moved = np.zeros_like(shares)
@@ -224,7 +224,7 @@ def _flowing(shares: Array, base: Residual) -> Array:
 def _carried(
     name: str, more: Array, block: Block, core: _core.Rig, prepared: Prepared, base: Residual
 ) -> Array:
-    """What an error of a drive does to a block's output; nothing where the model cannot follow."""
+    """Change of a block's output by an error of a drive; zero where the model cannot follow."""
     value, slope = prepared.signals[name]
     shaken = prepared.shaken({name: (value + more, slope + np.gradient(more, prepared.dt))})
     with contextlib.suppress(SimulationError):
@@ -233,8 +233,8 @@ def _carried(
 
 
 def whitening(curves: Array) -> Callable[[Array], Array]:
-    """How rows with unit noise beside an error that consists of curves get unit covariance:
-    multiplied by ``(1 + curves curves^T)^(-1/2)`` (Woodbury).
+    """Function that gives unit covariance to rows of unit noise and an error that consists of
+    curves: it multiplies them by ``(1 + curves curves^T)^(-1/2)`` (Woodbury).
 
     Parameters
     ----------

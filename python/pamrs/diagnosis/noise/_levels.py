@@ -1,6 +1,4 @@
-"""How much of a block's residual is more than noise: noise levels, excess, statistics of
-autocorrelated residuals.
-"""
+"""Noise levels, excess of residuals over them, and statistics of autocorrelated residuals."""
 
 from __future__ import annotations
 
@@ -41,7 +39,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NoiseLevel:
-    """What noise alone leaves in a block's residual over one recording.
+    """Level of a block's residual over one recording by noise, and by the stated error of the
+    model.
 
     Attributes
     ----------
@@ -231,8 +230,8 @@ def means_in_noises(
 def error_sizes(
     problem: Problem, found: dict[Key, Residual], noise_level: dict[Key, NoiseLevel]
 ) -> tuple[dict[str, float], float]:
-    """How large the error of the model most probably is in each block, as a share of what is taken
-    for usual and at most 1, from what a hypothesis leaves; and how probable that is then.
+    """Most probable size of the model's error in each block, as a share of the usual one and at
+    most 1, by what a hypothesis leaves; and the log evidence of these sizes.
 
     The residuals are those of one Gaussian process with curves of that size, which has a log-normal
     prior about the usual one: recordings that show a model to be better than usual may show what
@@ -276,8 +275,8 @@ def error_sizes(
 
 
 def _evidence(rows: Array, curves: Array, rest: Array, size: float) -> float:
-    """Logarithm of the probability of rows with unit noise beside curves so many times as high,
-    whose size is log-normal about 1.
+    """Log probability of rows with unit noise and curves that are `size` times as high, a size that
+    is log-normal about 1.
     """
     variance = 1.0 + size**2 * rest
     y = rows / np.sqrt(variance)
@@ -305,7 +304,7 @@ def with_sizes(
 
 
 def _with_error(noise: float, error: float) -> dict[str, float]:
-    """What a noise level has of the variances of noise and of an error of the model."""
+    """Entries of a noise level by the variances of noise and of an error of the model."""
     rest = _CURVE_REST * error
     return {
         "binned": math.sqrt(noise + error),
@@ -339,7 +338,7 @@ def _own(
 
 
 def _rounding(values: Array, step: float, rng: np.random.Generator) -> Array:
-    """What a converter with such steps, which lie anywhere, adds to values."""
+    """Rounding error that a converter, whose steps lie anywhere, adds to values."""
     place = step * rng.uniform()
     seen = values + place
     return np.asarray(np.round(seen / step) * step - place - values, dtype=np.float64)
@@ -397,8 +396,8 @@ Bins = dict[Key, tuple[Array, Array]]
 
 
 def _beside_curves(bins: Bins, levels: dict[Key, NoiseLevel]) -> Bins:
-    """Bin means without what the most probable curves tell of them, so that noise and such curves
-    alone leave the variance of the noise (one curve for all recordings).
+    """Bin means without the most probable curves of the model's error, so that noise and such
+    curves alone leave the variance of the noise (one curve for all recordings).
     """
     known = [key for key, level in levels.items() if level.curves is not None]
     seen = {key: bins[key][1] > 0 for key in known}

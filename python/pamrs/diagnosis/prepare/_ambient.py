@@ -1,4 +1,4 @@
-"""The temperature that air, walls and supply have, as it was measured beside a rig."""
+"""Temperature of air, walls and supply, as it was measured next to a rig."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What went on before a recording began, as far as its first samples tell."""
+"""Commands and pressures before a recording began, as far as its first samples show them."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _PRESSURES: Final = with_trait("pressure")
 
 
 class Before(NamedTuple):
-    """What is taken to have gone on before a recording began: commands and pressures stood where
-    they begin, and lately the pressures moved as they begin to move.
+    """Assumed time before a recording: commands and pressures stay at their first values, and
+    lately the pressures moved at their first rate.
 
     Attributes
     ----------

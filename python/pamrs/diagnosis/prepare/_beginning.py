@@ -1,4 +1,4 @@
-"""How long a recording remembers a beginning that nobody measured.
+"""First samples of a recording that depend on a beginning that nobody measured.
 
 A regulator whose outlet has no gauge begins a recording somewhere between what it feeds and what it
 is set to: at rest all three are the same, and a log that begins as a stopcock is opened has them
@@ -108,8 +108,7 @@ def _unheard(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> di
 
 
 def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances) -> bool:
-    """Whether a motion begins at rest: the model, freed of where its first window starts, follows
-    it better from there than from the speed that its first samples have.
+    """True where the model follows a motion better from rest than from its first samples' speed.
 
     A joint on its stop that is given a speed, by the noise of a few samples, bounces, and what a
     window is freed of is linear in where it starts.
@@ -153,7 +152,7 @@ def _trend(prepared: Prepared, channel: str, rows: Index) -> float:
 
 
 class _Beginnings:
-    """What the blocks of a rig predict of one recording from different beginnings."""
+    """Predictions of one recording by the blocks of a rig, from different beginnings."""
 
     def __init__(self, blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> None:
         self.core, self.prepared = core, prepared
@@ -174,7 +173,7 @@ class _Beginnings:
         return int(seen[-1]) + 1 if seen.size else 0
 
     def _by_outlets(self, block: Block) -> Array:
-        """What it makes that regulators begin at what they are set to."""
+        """Change of a prediction if regulators begin at their set pressures."""
         prepared = self.prepared
         outlets = {
             qualified("supply", block_of(name)): max(0.0, float(prepared.held[name][0]))
@@ -186,7 +185,7 @@ class _Beginnings:
             return np.zeros(0)  # the fit says what cannot be predicted
 
     def _by_tubes(self, block: Block) -> Array:
-        """What it makes that air flowed through tubes before; nothing where it did not."""
+        """Change of a prediction if air flowed through tubes before; empty where it did not."""
         try:
             apart = self._from(block, moving=True) - self._from(block, moving=False)
             little = np.abs(apart).max() <= _STILL_NOISES * self.prepared.noise[block.channel]
@@ -198,7 +197,7 @@ class _Beginnings:
         return np.zeros(0) if at_rest else apart
 
     def _stands_still(self, tube: Tube) -> bool:
-        """Whether neither end of a tube is seen to move as the recording begins."""
+        """True where no measured end of a tube is seen to move as the recording begins."""
         recording = self.prepared.recording
         early = max(
             2 * WINDOW_SAMPLES_PER_STATE, int(_STILL_DELAYS * tube.delay / self.prepared.dt)
@@ -213,7 +212,7 @@ class _Beginnings:
         return bool(names)
 
     def _waits(self, tube: Tube) -> bool:
-        """Whether a tube at rest is opened as the recording begins: until its ends hear of each
+        """True where a tube at rest is opened as the recording begins: until its ends hear of each
         other, `to` stands still, and neither moves as it would in a flow.
         """
         early = int(_SILENT_DELAYS * tube.delay / self.prepared.dt)
@@ -227,8 +226,8 @@ class _Beginnings:
         return fits and min(likely) > least
 
     def _tells(self, channel: str, early: int) -> tuple[bool, float] | None:
-        """Whether the first samples of a channel are those of a rest, and by which log likelihood
-        rather than those of a flow; None where there are too few of them.
+        """True for first samples of a channel that fit a rest, and the log likelihood of rest
+        against flow; None where there are too few samples.
         """
         rows = self.prepared.recording.mask[channel][:early]
         if rows.sum() < WINDOW_SAMPLES_PER_STATE:
@@ -263,7 +262,7 @@ def _set(block: Block) -> list[str]:
 
 
 def _unmeasured(block: Block) -> str:
-    """What nobody measured in a block, in words, and what would tell it."""
+    """Words on what nobody measured in a block, and on what would measure it."""
     told = []
     if _set(block) and block.beside:
         gauges = [dotted("supply_pressure", block_of(name)) for name in _set(block)]
@@ -281,7 +280,7 @@ def _unmeasured(block: Block) -> str:
 
 
 def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
-    """What is not judged of the beginnings, in words.
+    """Sentences on beginnings that are not judged.
 
     Parameters
     ----------

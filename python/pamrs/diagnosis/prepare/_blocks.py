@@ -176,21 +176,21 @@ class Block:
 
     @property
     def closure(self) -> str | None:
-        """The sum of terms that can stand for what is missing in it; None where the simulator has
-        none: at a load, at a force, at a temperature and in front of a line.
+        """Id of the closure, a sum of terms that can stand for what is missing in it; None where
+        the simulator has none: at a load, at a force, at a temperature and in front of a line.
         """
         named = channel_of(self.name)
         return None if named in ("load", "line") else CLOSURE_OF.get(self.kind)
 
     @property
     def mechanical(self) -> bool:
-        """Whether muscles and what they move make its output, and not air alone."""
+        """True where muscles and what they move make its output, and not air alone."""
         return self.kind in ("arm", "pull")
 
 
 @dataclass(frozen=True)
 class Unjudged:
-    """A block of a rig that the channels do not tell from the others.
+    """Block of a rig that the channels do not distinguish from the others.
 
     Attributes
     ----------
@@ -206,7 +206,7 @@ class Unjudged:
 
 
 def _not_recorded(names: Iterable[str]) -> str:
-    """Why a block is not judged that needs channels which not every recording has."""
+    """Reason why a block is not judged: it needs channels that not every recording has."""
     named = list(dict.fromkeys(names))
     few = len(named) == 1
     return f"{', '.join(named)} {'is' if few else 'are'} not in every recording"
@@ -260,7 +260,7 @@ def _ways(rig: Rig, has: frozenset[str]) -> list[_Way]:
 
 
 class _Map:
-    """Which channels and parameters belong to which block of a rig."""
+    """Channels and parameters that belong to each block of a rig."""
 
     def __init__(self, rig: Rig, channels: tuple[str, ...]) -> None:
         self.rig, self.has = rig, frozenset(channels)
@@ -298,7 +298,7 @@ class _Map:
         return tuple(dict.fromkeys(self.pressure(end) for end in others if end not in known))
 
     def _unread(self, block: str, *kinds: str) -> bool:
-        """Whether a block is a supply of one of these kinds whose pressure nobody measured."""
+        """True where a block is a supply of one of these kinds whose pressure nobody measured."""
         block_kind, _, name = block.partition(".")
         return (
             block_kind == "supply"
@@ -333,7 +333,7 @@ class _Map:
         )
 
     def moved(self, block: str, *names: str) -> set[str]:
-        """What can carry a derivative of some blocks of the rig, zeros of gauges apart."""
+        """Parameters of some blocks that can have a derivative, but for zeros of gauges."""
         tables = self.rig.tables(block)
         return {
             f"{qualified(block, name)}.{key.name}"
@@ -348,8 +348,8 @@ class _Map:
         return f"sensors.{name}.{key}" if name and name in own else f"sensors.{key}"
 
     def zeros(self, nodes: Iterable[str], joints: Iterable[str]) -> set[str]:
-        """Those of the gauges that are read at chambers, supplies and inlets of lines, by their
-        full names, and of the sensors of some joints.
+        """Zeros of the gauges at chambers, supplies and inlets of lines, given by their full names,
+        and of the sensors of some joints.
         """
         moving = (
             {"sensors.length_zero"}
@@ -417,7 +417,7 @@ class _Map:
         return ends | {inlet for inlet in inlets if inlet}
 
     def lacking(self, name: str, covers: str, needed: Iterable[str]) -> Unjudged | None:
-        """That a block is not judged without channels that it needs; None where all are there."""
+        """Entry of a block that is not judged for want of channels; None where all are there."""
         missing = [channel for channel in needed if channel not in self.has]
         return Unjudged(name, covers, _not_recorded(missing)) if missing else None
 
@@ -786,8 +786,8 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
 
 
 def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tuple[Array, Array]]:
-    """The smoothed channels, with the best that can be told where windows start of what a block
-    integrates (an arm: all joints); inlets of lines only where the block is cut there.
+    """Smoothed channels, with the best estimates, where windows start, of what a block integrates
+    (an arm: all joints); inlets of lines only where the block is cut there.
     """
     state = [
         n
@@ -924,7 +924,7 @@ class _GasStart:
 
     @classmethod
     def of(cls, block: Block, prepared: Prepared) -> _GasStart | None:
-        """That of a block in a recording; None where it is measured, or there is none."""
+        """Start of a block's gas in a recording; None where it is measured, or there is no gas."""
         if block.warm is None:
             return None
         pressures = [
@@ -985,9 +985,9 @@ def _freed_window(
 
 
 def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array) -> list[Array]:
-    """What the level of each simulated drive, and how far it falls, does to a prediction, and of a
-    temperature a share of the wall's in what the thermometer reads; `core` is the rig as it was in
-    the recording.
+    """Change of a prediction by the level of each simulated drive and by how far it falls, and of a
+    temperature by a share of the wall's in what the thermometer reads; `core` is the rig as it was
+    in the recording.
     """
     # a wall is as warm as the room: a share of it makes what the gas does smaller by that share
     columns = [prediction - float(np.mean(prediction))] if block.kind == "temperature" else []
@@ -1003,8 +1003,8 @@ def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array
 
 
 def _beside_starts(columns: list[Array], starts: list[tuple[int, int, Array]]) -> Array:
-    """What is free in a whole recording (n, k), orthonormal, beside what the starts of its windows
-    can do.
+    """Orthonormal columns (n, k) that are free in a whole recording, without what the starts of its
+    windows can do.
     """
     kept, rounding = [], float(np.finfo(np.float64).eps) ** 0.5
     for column in columns:
@@ -1059,8 +1059,8 @@ def _from_its_start(
     names: list[str],
     given: Input | None,
 ) -> tuple[Prepared, Array, Array, Array]:
-    """The same with a gas that begins as warm as its pressure and a prior say, and the recording
-    with that temperature: steps of Gauss and Newton in it.
+    """Output and derivatives as of `_with_slopes`, of a gas that begins as warm as its pressure and
+    a prior say (Gauss-Newton), and the recording with that temperature.
     """
     gas = _GasStart.of(block, prepared)
     found = _with_slopes(block, core, prepared, starts, names, given)

@@ -1,4 +1,4 @@
-"""What of two recordings is the same although no command makes it so: their noise.
+"""Noise that two recordings share although no command makes it so: one is a copy.
 
 A channel's deviations are what its own neighbours do not tell of a sample: of a smooth signal its
 noise, whatever the signal is. Those of a repetition are independent of one another. Those of a copy
@@ -71,13 +71,13 @@ _TINY: Final = 1e-300  # keeps a quotient finite
 
 
 def is_set(name: str) -> bool:
-    """Whether a channel is set and not measured: it repeats exactly."""
+    """True where a channel is set and not measured: it repeats exactly."""
     return channel_of(name) in _SET
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """Where the samples of a recording lie in another one.
+    """Times of a recording's samples in another recording.
 
     Attributes
     ----------
@@ -97,9 +97,9 @@ class Alignment:
 
 
 class Told(NamedTuple):
-    """At an alignment: rows of the slower recording that lie in the other one; rows in which some
-    channel's deviations are those of the other one, and in which those of all channels that say
-    anything are others.
+    """Rows of the slower of two recordings at an alignment: those that lie in the other one, those
+    in which some channel's deviations are the same, and those in which all channels that show
+    anything differ.
     """
 
     way: Alignment
@@ -119,7 +119,7 @@ class _Channel(NamedTuple):
     step: float
 
     def at(self, rows: Index) -> _Channel:
-        """The same at some rows."""
+        """Channel at some rows."""
         return _Channel(self.values[rows], self.known[rows], self.deviations[rows], self.step)
 
 
@@ -130,7 +130,7 @@ class Channels:
         self._found: dict[tuple[Recording, str], _Channel] = {}
 
     def of(self, recording: Recording, names: Sequence[str]) -> dict[str, _Channel]:
-        """Those of a recording, by name."""
+        """Channels of a recording, by name."""
         for name in names:
             if (recording, name) not in self._found:
                 values, known = recording.channels[name], recording.mask[name]
@@ -178,7 +178,7 @@ def told(slow: Recording, fast: Recording, names: list[str], channels: Channels)
 
 
 def _channel(values: Array, known: Mask) -> _Channel:
-    """A channel and what its neighbours do not tell of each sample."""
+    """Channel with the deviation of each sample from what its neighbours predict."""
     index = np.arange(values.size)
     nothing = np.zeros(values.size)
     if known.sum() < 4 * _BESIDE_SAMPLES or not np.ptp(values[known]) > 0.0:
@@ -211,8 +211,8 @@ def _channel(values: Array, known: Mask) -> _Channel:
 
 
 def _followed(source: Array, offsets: Index, wanted: Array, use: Mask) -> tuple[Array, Array]:
-    """What samples of a source at some offsets tell of each sample, by the linear combination that
-    is nearest in some rows, and that combination.
+    """Weights with which a source's samples at some offsets predict the wanted ones best in some
+    rows, and that prediction of all samples.
     """
     rows = np.flatnonzero(use)
     rows = rows[:: max(1, rows.size // _ROWS)]
@@ -272,8 +272,8 @@ def _clocks(
     own: dict[str, _Channel],
     there: dict[str, _Channel],
 ) -> Iterator[tuple[float, float]]:
-    """How fast the clock of the slower recording may go in the other one, and from when [1, s]: as
-    both say; backwards; sample by sample; as blocks of it say that are found there.
+    """Rates of the slower recording's clock in the other one, and times from which they run [1, s]:
+    as both say; backwards; sample by sample; as blocks of it are found there.
     """
     yield 1.0, 0.0
     yield -1.0, fast.duration
@@ -361,7 +361,7 @@ def _at(
 
 
 def _single(values: Array) -> NDArray[np.float32]:
-    """Numbers of which seven digits are enough: what they tell of noise is far less certain."""
+    """Numbers in single precision: what they say of noise is far less certain."""
     return values.astype(np.float32)
 
 
@@ -426,8 +426,8 @@ def _by_window(a: _Channel, b: _Channel) -> tuple[Mask, Mask, bool]:
 
 
 def _same_flips(a: _Channel, b: _Channel) -> bool:
-    """Whether two channels on the steps of a converter flip in the same samples, where noise of
-    their own would let them flip in others.
+    """True where two channels on the steps of a converter flip in the same samples; noise of their
+    own would let them flip in others.
     """
     step = max(a.step, b.step)
     known = a.known & b.known
@@ -445,8 +445,8 @@ def _same_flips(a: _Channel, b: _Channel) -> bool:
 
 
 def _flips(levels: Array) -> int:
-    """How often a converter flips because of noise: there, back and there again within a few
-    samples. A signal that turns goes there and back once, and does so in every repetition.
+    """Number of flips of a converter by noise: there, back and there again within a few samples. A
+    signal that turns goes there and back once, and does so in every repetition.
     """
     change = np.diff(levels)
     at = np.flatnonzero(change)
@@ -481,7 +481,7 @@ def _between(
 
 
 def _repeats(slow: Recording, fast: Recording) -> bool:
-    """Whether both have the same commands, sample by sample, that change."""
+    """True where both recordings have the same changing command, sample by sample."""
     size = min(len(slow), len(fast))
     for name, values in slow.channels.items():
         if name in fast.channels and is_set(name):

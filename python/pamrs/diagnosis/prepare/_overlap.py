@@ -34,7 +34,7 @@ _MOST_RATE_RATIO = 50.0  # ratio of sample times up to which recordings are comp
 
 @dataclass(frozen=True)
 class Overlap:
-    """What one recording holds of another.
+    """Samples that one recording shares with another.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
 def _new_in(
     recording: Recording, before: Sequence[Recording], channels: Channels
 ) -> tuple[list[Recording], list[str]]:
-    """What of a recording is not in others, and a sentence where that is not all of it."""
+    """Parts of a recording that are not in others, and a sentence where these are not all of it."""
     for other in before:
         found = overlap(recording, other, channels)
         across = recording.role != other.role
@@ -203,8 +203,8 @@ def _in_other(way: Alignment, run: tuple[float, float]) -> tuple[float, float]:
 
 
 def _taken(found: Told) -> Mask:
-    """Rows that two recordings share: those that are told, and all beside them that are not denied
-    over three windows or more.
+    """Rows that two recordings share: those found to be the same, and all between them but for runs
+    of three windows or more that differ.
     """
     shared, own = found.same.copy(), np.zeros(found.same.size, dtype=bool)
     for first, last in stretches(found.other):
@@ -221,7 +221,7 @@ def _taken(found: Told) -> Mask:
 def _gaps(
     duration: float, taken: Sequence[tuple[float, float]], margin: float
 ) -> tuple[tuple[float, float], ...]:
-    """What a recording has beside stretches of it, with a margin on either side [s]."""
+    """Stretches of a recording outside given ones, with a margin on either side [s]."""
     found, start = [], 0.0
     for a, b in taken:
         found.append((start, a - margin))

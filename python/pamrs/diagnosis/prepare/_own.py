@@ -65,7 +65,7 @@ def _core_name(rig: Rig, name: str) -> str:
 
 
 def _nominal(rig: Rig, name: str) -> float:
-    """What the rig file says of one of its parameters, or of one of its effects."""
+    """Value in the rig file of one of its parameters, or of a parameter of one of its effects."""
     found = effect_parameter(rig, name)
     if found is None:
         return rig.parameter(name).value
@@ -80,8 +80,8 @@ def with_own_values(
     prepared: Prepared,
     tanks: Sequence[str],
 ) -> Prepared:
-    """A recording with the values of its own that fit it best, beside the nominal ones of all
-    others; around them they stay free, a tank's by its level.
+    """Recording with the values of its own that fit it best, all others being nominal; around them
+    they stay free, a tank's by its level.
 
     Steps of Gauss and Newton on the blocks that depend on them, each kept where it leaves less.
 

@@ -1,5 +1,4 @@
-"""What a recording cannot be: units, swapped columns and dead sensors that are seen before anything
-is fitted.
+"""Checks of recordings before any fit: units, swapped columns and dead sensors.
 
 A mismatch that a wrong heading makes is not physics. What is looked at needs no fit: sizes against
 the rig file, the order of pressures, the range of joints, the sense in which a pressure follows its
@@ -256,7 +255,7 @@ def _values(recording: Recording, name: str) -> Array:
 
 
 def _clock(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
-    """A sample time at which motion can be followed."""
+    """Finding on a sample time that is too long for motion to be followed."""
     longest = settings.longest_sample_time
     if _moving(rig, settings) and recording.sample_time > longest:
         what = "a joint" if rig.tables("joint") else "a load"
@@ -267,7 +266,7 @@ def _clock(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Itera
 
 
 def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
-    """Sizes of pressures, by themselves and beside the rig file or a regulator's command."""
+    """Findings on sizes of pressures, alone and against the rig file or a regulator's command."""
     rated = {
         dotted("supply_pressure", supply): told
         for supply in rig.tables("supply")
@@ -320,8 +319,8 @@ def _inlet_of(rig: Rig, supply: str) -> str:
 
 
 def _in_front(recording: Recording, rig: Rig, supply: str) -> float:
-    """Lowest that the pressure in front of a regulator is known to be [Pa gauge]: it may be set to
-    more, and gives no more; infinite where nothing stands there.
+    """Lowest known pressure in front of a regulator [Pa gauge]: it may be set to more, and gives no
+    more; infinite where there is no inlet.
     """
     inlet = _inlet_of(rig, supply)
     if not inlet:
@@ -332,8 +331,8 @@ def _in_front(recording: Recording, rig: Rig, supply: str) -> float:
 
 
 def _set_to(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | None:
-    """About the highest pressure [Pa gauge] that a supply should have, and the command that says
-    so; no command where the rig file does.
+    """Highest pressure [Pa gauge] that a supply should have, and the command that says so; no
+    command where the rig file does.
 
     A regulator may be set to anything: its largest command tells, but for spikes; None where it was
     not recorded.
@@ -347,7 +346,7 @@ def _set_to(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | 
 
 
 def _frozen_tanks(recording: Recording, rig: Rig) -> Iterator[str]:
-    """Tanks that read one value although they are drawn from."""
+    """Findings on tanks that read one value although they are drawn from."""
     valves = rig.ports("valve")
     for supply, table in rig.tables("supply").items():
         name = dotted("supply_pressure", supply)
@@ -386,7 +385,7 @@ def fed_by(rig: Rig) -> dict[str, list[str]]:
 
 
 def _order(recording: Recording, rig: Rig) -> Iterator[str]:
-    """A muscle is not at a higher pressure than what feeds it, nor a regulator than its inlet."""
+    """Findings on muscles above their supply's pressure, and regulators above their inlet's."""
     fed = {dotted("muscle_pressure", chamber): found for chamber, found in fed_by(rig).items()}
     for regulator in rig.tables("supply"):
         inlet = _inlet_of(rig, regulator)
@@ -420,7 +419,7 @@ def _order(recording: Recording, rig: Rig) -> Iterator[str]:
 
 
 def _highest(recording: Recording, rig: Rig, supply: str) -> tuple[str, Mask, Array] | None:
-    """What a supply's pressure is told by, where that is known, and the highest that it can be.
+    """Source of a supply's pressure, rows in which it is known, and the highest that it can be.
 
     That is its gauge; of a regulator without one the largest set pressure, since what it feeds
     follows a falling one late; else the pressure of the rig file. None where nothing tells it.
@@ -438,9 +437,7 @@ def _highest(recording: Recording, rig: Rig, supply: str) -> tuple[str, Mask, Ar
 
 @dataclass(frozen=True)
 class _Moving:
-    """What muscles move: its channel, unit and range, how far and fast it may be, and the chambers
-    of its muscles.
-    """
+    """Joint or load that muscles move: channel, unit, range, margin, speed, and chambers."""
 
     channel: str
     unit: str
@@ -480,7 +477,7 @@ def _moving(rig: Rig, settings: DiagnosisSettings) -> list[_Moving]:
 
 
 def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
-    """Range, rate and life of joint angles and of a load's length."""
+    """Findings on range, rate and life of joint angles and of a load's length."""
     for moving in _moving(rig, settings):
         name, unit = moving.channel, moving.unit
         values = _values(recording, name)
@@ -538,7 +535,7 @@ def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iter
 
 
 def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
-    """Commands inside the valve's range, and pressures that rise when they say fill."""
+    """Findings on commands outside the valve's range, and on pressures that go against them."""
     still_by = {"joint_angle": _STILL_ANGLE, "length": _STILL_LENGTH}
     inlets = {dotted("line", name): e["to"] for name, e in rig.ports("line").items()}
     for valve, ends in rig.ports("valve").items():
@@ -617,9 +614,9 @@ def _commanded(rig: Rig) -> Iterator[tuple[str, str]]:
 
 
 def _dead(recording: Recording, rig: Rig) -> dict[str, str]:
-    """Commands of one value beside a pressure that stands still and then is filled or vented, with
-    the evidence. At one opening, or one set pressure, it comes to rest once, and what moves changes
-    it by less.
+    """Commands of one value while their pressure rests and then is filled or vented, with the
+    evidence: at one opening, or one set pressure, it comes to rest once, and motion changes it by
+    less.
     """
     ambient = float(rig.model["gas"]["ambient_pressure"])
     found: dict[str, str] = {}
@@ -693,7 +690,7 @@ def without_dead_commands(
 
 
 def _moves(recording: Recording, channel: str) -> bool:
-    """Whether a channel has more than one value."""
+    """True where a channel has more than one value."""
     values = _values(recording, channel)
     return bool(values.size) and float(np.ptp(values)) > 0.0
 
@@ -742,8 +739,8 @@ def check_sense(
 
 
 def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
-    """What would make the model's angle that of the recording: another unit, the other sign, two
-    pressures in each other's place.
+    """Finding on an angle that the model would have in another unit, with the other sign, or with
+    two pressures swapped; None where there is none.
     """
     starts = prepared.starts(block.window, block.drives)
     rows = prepared.usable(block.channel, block.drives, starts)

@@ -64,7 +64,7 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
 
 
 def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> Mask:
-    """Samples of a channel at the end of its range, and those beside them; those that are masked
+    """Samples of a channel at the end of its range, with their neighbours; those that are masked
     because they stay there included.
     """
     values, mask = recording.channels[channel], recording.mask[channel]
@@ -96,7 +96,7 @@ def _masked(recording: Recording, channel: str, bad: Mask) -> Recording:
 def _sentence(
     recordings: Sequence[Recording], channel: str, rail: float, counts: dict[str, int]
 ) -> str:
-    """Where a sensor's range ends and what of each recording was masked for it, in words."""
+    """Sentence on the end of a sensor's range, and on samples masked for it in each recording."""
     unit = next((u for r in recordings if (u := r.said.get(channel))), "")
     if unit:
         parsed = parse_unit(unit)
@@ -157,7 +157,7 @@ def without_poor_thermometers(
 
 
 def _fault(recording: Recording, name: str) -> str:
-    """Why a temperature cannot be judged; empty where it can."""
+    """Reason why a temperature cannot be judged; empty where it can."""
     values, mask = recording.channels[name], recording.mask[name]
     if few_usable(mask):
         return f"only {int(mask.sum())} of {mask.size} samples are usable"

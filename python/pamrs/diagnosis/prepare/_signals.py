@@ -172,8 +172,7 @@ class Prepared:
         return sorted(starts)
 
     def begun(self, channel: str, starts: list[int]) -> tuple[Array, Array]:
-        """A smoothed channel and its derivative, with the best that can be told of both where
-        windows start.
+        """Smoothed channel and its derivative, with the best estimates of both where windows start.
 
         At the edge of a recording the filter's derivative is ten times as noisy as inside, and a
         joint that is given a speed that it did not have slides from where it stood. At a start the
@@ -200,15 +199,13 @@ class Prepared:
         return self._begun[key]
 
     def bridged(self) -> Prepared:
-        """The same recording without a hole, for what is simulated through them: no window begins
-        anew behind one.
-        """
+        """Recording without holes, for simulations through them: no window begins there."""
         whole = {name: np.ones_like(own) for name, own in self.recording.mask.items()}
         return replace(self, recording=replace(self.recording, mask=whole), _begun={}, _clear={})
 
     def commanded_early(self) -> Prepared | None:
-        """The same recording with commands that change where a hole in them begins, and not where
-        it ends; None where that is the same.
+        """Recording whose commands change where a hole in them begins, not where it ends; None
+        where that is no change.
         """
         commands, logged = dict(self.commands), dict(self.held)
         for name in set(commands) & set(self.recording.channels):
@@ -224,9 +221,7 @@ class Prepared:
         return replace(self, commands=commands, held=logged)
 
     def shaken(self, shaken: dict[str, tuple[Array, Array]]) -> Prepared:
-        """The same recording with other smoothed channels; what the others begin from is not looked
-        for again.
-        """
+        """Recording with other smoothed channels; the starts of all others are kept."""
         kept = {key: state for key, state in dict(self._begun).items() if key[0] not in shaken}
         return replace(self, signals=self.signals | shaken, _begun=kept)
 
@@ -292,8 +287,8 @@ def _lattice(values: Array) -> float:
 
 
 def _stays(values: Array, mask: Mask) -> bool:
-    """Whether a channel stays on a number from sample to sample, as one that a converter rounds
-    does: an even stroke that is sampled evenly has numbers as evenly apart, and rounds nothing.
+    """True where a channel often keeps its value from sample to sample, as one that a converter
+    rounds does; an even stroke that is sampled evenly rounds nothing.
     """
     both = mask[1:] & mask[:-1]
     equal = np.diff(values)[both] == 0.0
@@ -301,8 +296,8 @@ def _stays(values: Array, mask: Mask) -> bool:
 
 
 def _quietest_band(values: Array, mask: Mask) -> float:
-    """Variance of white noise that would be as loud everywhere as the quietest band of a signal is;
-    infinite where too few samples stand side by side.
+    """Variance of white noise as loud everywhere as the quietest band of a signal; infinite where
+    too few samples are usable in a row.
     """
     lines = _SPECTRUM_SAMPLES // 16
     if values.size < _SPECTRUM_SAMPLES:
@@ -365,7 +360,7 @@ def lengths_of(values: Array, noise: float, dt: float, settings: DiagnosisSettin
 
 
 def _is_one_cubic(values: Array, noise: float, length: int) -> bool:
-    """Whether one cubic fits a whole channel but for its noise: what is held, or drifts.
+    """True where one cubic fits a whole channel but for its noise: it is held, or drifts.
 
     Noise of such a channel would drive a model, and an effect that makes the model answer less to
     what drives it would seem to be in the data. Asked of what the cubic misses are its means over
@@ -425,9 +420,7 @@ def _long_holes(mask: Mask, bridged: int) -> list[tuple[int, int]]:
 
 
 def _steps(command: Array, a: int, b: int) -> bool:
-    """Whether a command steps in a hole from one sample to another: by far more than it usually
-    changes over as many.
-    """
+    """True where a command steps in a hole: by far more than it usually changes in that time."""
     if a == 0 or b == command.size or command[b] == command[a - 1]:
         return False
     usual = float(np.median(np.abs(command[b - a + 1 :] - command[: a - b - 1])))
@@ -541,7 +534,7 @@ def _looked_at(recording: Recording, rig: Rig, core: _core.Rig) -> list[str]:
 
 
 def unusable(recording: Recording, rig: Rig, core: _core.Rig, settings: DiagnosisSettings) -> str:
-    """Why a recording cannot be diagnosed; empty where it can.
+    """Reason why a recording cannot be diagnosed; empty where it can.
 
     Parameters
     ----------
@@ -604,7 +597,7 @@ def _as_logged(recording: Recording, name: str) -> Array:
 
 
 def few_usable(mask: Mask) -> bool:
-    """Whether too few samples of a channel are usable for a diagnosis."""
+    """True where too few samples of a channel are usable for a diagnosis."""
     least = max(_LEAST_CHANNEL_SAMPLES, _LEAST_CHANNEL_SHARE * mask.size)
     return bool(mask.sum() < least)
 
@@ -645,8 +638,8 @@ def thermometers_of(rig: Rig) -> dict[str, str]:
 
 
 def moves_by_gauges(recording: Recording, rig: Rig) -> bool:
-    """Whether what moves a rig's joints or load was measured past its valves, so that they can be
-    judged without a command.
+    """True where what moves a rig's joints or load was measured past its valves, so that they can
+    be judged without a command.
     """
     joints = (
         ["length"]
@@ -661,8 +654,8 @@ def moves_by_gauges(recording: Recording, rig: Rig) -> bool:
 
 
 def uncommanded(recording: Recording, rig: Rig, inputs: list[str]) -> str:
-    """That a recording lacks a command, unless what moves a joint or load was measured past the
-    valves; else empty.
+    """Reason why a recording without a command cannot be used; empty where it has all, or where
+    what moves a joint or load was measured past the valves.
     """
     missing = [name for name in inputs if name not in recording.channels]
     if not missing or moves_by_gauges(recording, rig):

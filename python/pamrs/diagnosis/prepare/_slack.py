@@ -1,4 +1,4 @@
-"""Muscles without air are slack in the model: where that is why it lags behind what moved."""
+"""Lag of a model behind what moved because its muscles without air are slack."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _BETTER = 0.5  # share of what is missed there that is left with a push, where t
 
 
 def said_of_slack(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
-    """That a model lags where its muscles are slack, and would follow if they pushed, in words.
+    """Sentences on models that lag where muscles are slack, and would follow if these pushed.
 
     Parameters
     ----------

@@ -13,8 +13,8 @@ _FEW: Final = 8  # parts that are named
 
 
 def noted_units(case: Case) -> list[str]:
-    """How the numbers of a case's files became values where the files alone do not say: units that
-    were assumed, ambient pressures that were subtracted, parts that no recording takes.
+    """Sentences on what the files of a case do not say: units that were assumed, ambient pressures
+    that were subtracted, parts that no recording takes.
 
     Parameters
     ----------

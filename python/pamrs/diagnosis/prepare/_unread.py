@@ -97,7 +97,7 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
 
 
 def said_of_tanks(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
-    """What is taken of tanks without a gauge, in words."""
+    """Sentences on tanks without a gauge: the blocks that their simulated pressure drives."""
     said = []
     for tank in dict.fromkeys(name for block in blocks for name in block.floating):
         name = begins_at(tank)

@@ -1,4 +1,4 @@
-"""Which effects are worth a fit: scores, and one recording left out after the other.
+"""Screen for effects that are worth a fit: scores, and one recording left out after the other.
 
 Public: `Score`, `Screen`, `Tangent`, `screen`, `tangent_of`, `by_effect`, `best_of_each_kind`,
 `predicted_by_others`.

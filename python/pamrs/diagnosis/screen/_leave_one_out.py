@@ -80,7 +80,7 @@ def predicted_by_others(
 
 
 def _knows_all(found: Fit) -> bool:
-    """Whether a fit has the sensitivities to all of its parameters."""
+    """True where a fit has the sensitivities to all of its parameters."""
     return all(
         r.jacobian is not None and r.jacobian.shape[1] == len(found.values)
         for r in found.residuals.values()
@@ -119,7 +119,7 @@ def _parts(problem: Problem, found: Fit) -> list[dict[Key, slice]]:
 def _sums(
     problem: Problem, found: Fit, inflation: dict[str, float], scales: Array, part: dict[Key, slice]
 ) -> tuple[Array, Array]:
-    """Normal matrix and gradient of what a part tells."""
+    """Normal matrix and gradient from the samples of a part."""
     within = {}
     for key, there in part.items():
         own = found.residuals[key]

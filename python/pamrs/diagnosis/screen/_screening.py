@@ -1,4 +1,5 @@
-"""Which effects are worth a fit: the score of each, the baseline's own freedom taken away first.
+"""Screen for effects that are worth a fit: a score for each, the baseline's freedom taken away
+first.
 
 An effect at a typical size changes the residuals by a signature. What the baseline parameters
 (inside their tolerances) and the starts of the windows can do is projected out of the signature and
@@ -61,7 +62,7 @@ _Values = tuple[str, str, tuple[tuple[str, float], ...]]
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """What one effect, from one start, would bring.
+    """Gain in chi-square that one effect, from one start, would bring.
 
     Attributes
     ----------
@@ -181,7 +182,7 @@ def by_effect(scores: list[Score]) -> dict[Term, list[Score]]:
 
 
 def best_of_each_kind(scores: list[Score]) -> list[Score]:
-    """Of an effect's scores, the best ones first, the first of each form and choice in it."""
+    """Best score of each form and choice of an effect, the best first."""
     best: dict[tuple[str, frozenset[tuple[str, float]]], Score] = {}
     for score in scores:
         best.setdefault(score.start.kind, score)
@@ -306,7 +307,7 @@ class _Looking:
                 self.try_(start)
 
     def try_(self, start: Start, looks: int | None = None) -> float:
-        """Add the signature of a start; what it would bring."""
+        """Add the signature of a start; return its gain in chi-square (minus infinity: none)."""
         begun = self.everywhere.get(_values(start)) if start.effect.at else None
         tried, best = start if begun is None else begun.moved(start.effect), None
         for _ in range(_MOST_SIGNATURES if looks is None else looks):
@@ -364,8 +365,8 @@ class _Looking:
             return None
 
     def _known(self, start: Start) -> dict[Key, Residual]:
-        """What is known of an effect at one place: in a block in which it acts at no other one, it
-        does what it does where it is everywhere.
+        """Residuals known of an effect at one place: in blocks where it acts at no other place,
+        those of the effect everywhere.
         """
         term = start.effect
         seen = self.seen.get(_values(start), {}) if term.at else {}
@@ -377,7 +378,7 @@ class _Looking:
         return {key: r for key, r in seen.items() if key[0] in own}
 
     def _taken(self, entry: Signature) -> float:
-        """What a start takes of the chi-square at its own size."""
+        """Reduction of the chi-square by a start at its own size."""
         signature = entry[2]
         along = float(self.tangent.left @ signature)
         return -2.0 * along - self.tangent.power(signature)
@@ -403,7 +404,7 @@ def _measured(problem: Problem, channel: str) -> Array | None:
 
 def _moved_to_action(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
     """Starts moved to where they act: a contact to places that were reached, a restriction to the
-    size of what it stands beside.
+    size of the opening next to it.
     """
     effect = starts[0].effect
     info = effect.info
@@ -428,8 +429,8 @@ def _moved_to_action(starts: list[Start], problem: Problem, rig: Rig) -> list[St
 def _scan_resonance(
     start: Start, try_: Callable[[Start], float], signatures: list[Signature]
 ) -> list[Start]:
-    """The values that tell most among many: what swings long has to be met within a few percent of
-    its frequency.
+    """Starts at the frequencies that gain most among many: what swings long has to be met within a
+    few percent of its frequency.
 
     They are tried with more damping than the effect has, which makes the resonance broader than the
     distance between two values.
@@ -453,9 +454,7 @@ def _scan_resonance(
 
 
 def _as_usual(start: Start, first: Start) -> Start:
-    """A start whose resonance is as broad as it usually is: from a broader one a fit may end beside
-    it.
-    """
+    """Start whose resonance is as broad as usual: from a broader one a fit may end next to it."""
     parameters = start.effect.info.form(start.form).parameters
     names = [f"{start.effect}.{p.name}" for p in parameters if p.tried is not None]
     return replace(start, free=start.free | {name: first.free[name] for name in names})
@@ -468,8 +467,8 @@ _CONDUCTANCES = ("fill_conductance", "vent_conductance")
 def _restrictions_like(
     starts: list[Start], parameter: EffectParameter, problem: Problem, rig: Rig
 ) -> list[Start]:
-    """Restrictions in parts of the conductance of the largest opening that they stand beside, where
-    a block could show them.
+    """Restrictions in parts of the conductance of the largest opening next to them, where a block
+    could show them.
     """
     kind, _, area = parameter.like.partition(".")
     unit = _core.Gas(*(rig.model["gas"][key.name] for key in BLOCKS["gas"])).area_of_conductance(
@@ -489,7 +488,7 @@ def _restrictions_like(
 
 
 def _shows(start: Start, block: Block) -> bool:
-    """Whether an effect acts in a block with the choices that a start holds."""
+    """True where an effect acts in a block with the choices that a start holds."""
     values = start.free | start.held
     parameters = [
         p for p in start.effect.info.form(start.form).parameters if block.kind in p.needed_in
