@@ -95,7 +95,7 @@ def _unsettled(rig: Rig) -> list[str]:
 
 
 def _capped(group: BlockGroup, factor: float) -> BlockGroup:
-    """A group of joints whose names have a smaller probability, the rest going to ``unlisted``."""
+    """Scale down all names in a group of moving blocks; ``unlisted`` gets the rest."""
     if group.mismatch is None or not group.mismatch.mechanical:
         return group
     kept = {h: factor * p if h.terms else p for h, p in group.probabilities.items()}
@@ -116,8 +116,8 @@ def _in_range(name: str) -> Iterator[None]:
 
 
 def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
-    """Regulators whose outflow only the difference of two measured pressures tells, where that is
-    mostly noise; why, by block.
+    """Regulators whose droop cannot be judged, and why, by block: only the difference of two
+    measured pressures shows their flow, and that is mostly noise.
 
     That noise grows with the droop, so that a fit would take the droop towards zero to be rid of it
     (errors in variables).
@@ -240,9 +240,7 @@ def diagnose(
 def _answered(
     ready: Ready, settings: DiagnosisSettings, asked: tuple[Hypothesis, ...], say: Steps
 ) -> tuple[Diagnosis, Ready]:
-    """The diagnosis of a case without recordings that its model cannot follow, each of them named;
-    and that case.
-    """
+    """Diagnose a case without recordings that its model cannot follow; return that case too."""
     try:
         return _answer(ready, settings, asked, say), ready
     except Unfollowed as error:
@@ -258,7 +256,7 @@ def _answered(
 def _answer(
     ready: Ready, settings: DiagnosisSettings, asked: tuple[Hypothesis, ...], say: Steps
 ) -> Diagnosis:
-    """The diagnosis of a case that was looked at."""
+    """Diagnose a case that passed the checks before any fit."""
     case = ready.case
     shortened, counts = averaged_to_need(case.recordings, ready.blocks, case.name, settings)
     case = replace(case, recordings=shortened)
@@ -315,9 +313,7 @@ def _recorded(case: Any, data: Any, *, allow_outside: bool) -> Case:
 def _physics(
     case: Case, inner: Problem, outer: Problem, unjudged: list[Unjudged], say: Steps
 ) -> tuple[Diagnosis, Problem, list[Unjudged]]:
-    """The diagnosis of recordings that are what their log says, the recordings to fit with the
-    blocks that were judged, and the blocks that were not.
-    """
+    """Diagnose physics: the result, recordings with judged blocks, and unjudged blocks."""
     every = inner.blocks
     motion = [b for b in inner.blocks if b.mechanical]
     parts = [[b for b in inner.blocks if not b.mechanical], motion]
@@ -379,9 +375,7 @@ def _physics(
 def _under_best_law(
     case: Case, asked: tuple[Hypothesis, ...], inner: Problem, stated: Diagnosis
 ) -> Diagnosis:
-    """The diagnosis under the laws that the recordings follow, where those of the rig file leave a
-    mismatch.
-    """
+    """Diagnosis under the best of other laws where the rig file's laws leave a mismatch."""
 
     def divided(rig: Rig) -> tuple[Problem, Problem, list[Unjudged]]:
         own, held, unjudged, _ = _problems(case.with_rig(rig), inner.settings, asked)
@@ -398,9 +392,7 @@ def _under_best_law(
 def _missing(
     answer: Answer, found: Conclusion, inner: Problem, outer: Problem
 ) -> MissingInput | None:
-    """The missing input of the block that the answer is about, as the refitted baseline leaves it,
-    and what the names take of it; None where it is no more than noise, or was not followed.
-    """
+    """Missing input of the answer's block; None where it is noise, or was not followed."""
     block = next((b for b in inner.blocks if b.name == answer.block), None)
     if block is None:
         return None
@@ -419,7 +411,7 @@ def _missing(
 
 
 def _limits(found: Conclusion, inner: Problem, outer: Problem) -> list[Limit]:
-    """From which sizes on the recordings would have shown effects and told them apart."""
+    """Sizes from which the recordings would have shown effects, and distinguished them."""
     every, baseline = _together(inner, outer), found.models.baseline
     left = {
         b.name: beyond(error.after, error.noise, found.own_errors[b.channel])
@@ -532,15 +524,13 @@ def _judged_only(
 
 
 def _on_time(inner: Problem, outer: Problem, rig: Rig) -> tuple[Problem, Problem, list[str]]:
-    """Recordings to fit and held-out ones whose commands act when they did, and which were moved;
-    the same problem where nothing is held out.
-    """
+    """Recordings, fitted and held out, with commands at the times they acted, and notes on that."""
     found, said = with_offsets([inner] if outer is inner else [inner, outer], rig)
     return found[0], found[-1], said
 
 
 def _asked(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, ...]:
-    """What the caller asks for, checked, each hypothesis once."""
+    """Hypotheses that the caller asks for, checked, each once."""
     if isinstance(consider, str):
         raise ValueError(
             f"consider = {consider!r} is not allowed: a list of such texts, [{consider!r}]"
@@ -576,9 +566,7 @@ def _asked(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, ...]:
 def _problems(
     case: Case, settings: DiagnosisSettings, asked: tuple[Hypothesis, ...]
 ) -> tuple[Problem, Problem, list[Unjudged], list[str]]:
-    """Recordings to fit and held-out ones (the same where there are no others) by block, blocks
-    that are not judged, and what is to be said of beginnings that nobody measured.
-    """
+    """Problems of fitted and held-out recordings, unjudged blocks, notes on unmeasured starts."""
     rig = case.rig
     fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
     held = [prepare(r, rig, settings) for r in case.held_out if case.fit]

@@ -85,7 +85,7 @@ def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
 
 
 def _mismatches(found: Diagnosis) -> list[BlockMismatch]:
-    """Those of the groups of blocks in which something is or may be missing or wrong."""
+    """Mismatches of the groups of blocks in which something is or may be missing or wrong."""
     return [m for part in found.answer.parts for m in part.group.mismatch]
 
 
@@ -96,8 +96,8 @@ def _noises(errors: Mapping[str, ChannelError], channels: Sequence[str]) -> floa
 
 
 def under(choice: OtherChoice, other: Diagnosis, stated: Diagnosis) -> Diagnosis:
-    """A diagnosis under another law, which says so and keeps what the model of the rig file misses
-    as that of the user.
+    """Diagnosis under another law that names this law; its errors ``before`` are those of the
+    user's model, under the law of the rig file.
     """
     own, before = other.proven, stated.proven
     both = [m for m in _mismatches(stated) if m.channel in own and m.channel in before]

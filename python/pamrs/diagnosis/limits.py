@@ -1,12 +1,12 @@
-"""Limits: sizes from which recordings show an effect, and from which they tell it from what else
-it could be.
+"""Limits: sizes from which recordings show an effect, and from which they can name it.
 
-An effect at a typical size changes the residuals of the cut chain by a signature. Parameters
-inside their tolerances and the error of the model may take what they can of it; what is left, in
-units of the noise, says from which size on the effect is detected, and what of it is left
-beside another signature of any size, from which size on it is told from that one (Eriksson, Frisk &
-Krysander, A method for quantitative fault diagnosability analysis of stochastic linear descriptor
-models, Automatica 49, 2013: distinguishability; the error of the model counts as noise here).
+An effect at a typical size changes the residuals of the cut chain by a signature. Parameters inside
+their tolerances and the error of the model may take what they can of it; the rest, in units of the
+noise, gives the size from which the effect is detected. The rest that is left when another
+signature of any size is taken out as well gives the size from which it is distinguished from that
+one (Eriksson, Frisk & Krysander, A method for quantitative fault diagnosability analysis of
+stochastic linear descriptor models, Automatica 49, 2013: distinguishability; the error of the model
+counts as noise here).
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ baseline parameters by one tolerance, signatures.
 
 
 def possible_starts(rig: Rig, blocks: Sequence[Block]) -> list[Start]:
-    """Every start of every effect that a rig can have and does not have; where some blocks tell
-    apart at which place it acts, of the effect at each of them.
+    """Every start of every effect that a rig can have and does not have; at each place of an effect
+    where some blocks distinguish these.
     """
     found: list[Start] = []
     own = {held["id"] for held in rig.effects}
@@ -156,9 +156,7 @@ def products_of(
 
 
 def _freed(products: Array, count: int) -> Array:
-    """Products of the other columns when the first ones, each with a normal prior of one unit, have
-    taken what they can.
-    """
+    """Products of the last columns, the first (normal priors of one unit) being fitted out."""
     if count == 0:
         return products
     own, mixed = products[:count, :count], products[:count, count:]
@@ -167,8 +165,8 @@ def _freed(products: Array, count: int) -> Array:
 
 
 def _copies(products: Array, curves: int, count: int) -> Array:
-    """Size of every effect's small copy that makes all of them in a block together as large as the
-    curves of its error are in a recording; infinite where it does not show.
+    """Multiple of each effect's signature at which all of them in a block are together as large as
+    the curves of its error; infinite where an effect does not show.
     """
     power = np.diag(products)[products.shape[0] - count :]
     acting = power > _NOTHING**2
@@ -177,8 +175,8 @@ def _copies(products: Array, curves: int, count: int) -> Array:
 
 
 def _beside_error(products: Array, curves: int, copies: Array) -> Array:
-    """Products of baseline and signatures of a block when the error of its model has taken what it
-    can: its curves, and a small copy of every effect (no model errs in functions of place alone).
+    """Products of a block's baseline and signatures after the error of its model is fitted out: its
+    curves, and a small copy of every effect (no model errs in functions of place alone).
     """
     own, signatures = np.split(np.arange(products.shape[0]), [products.shape[0] - copies.size])
     order = np.concatenate([own[:curves], signatures, own[curves:], signatures])
@@ -250,15 +248,13 @@ class Limits:
         self.bits = 0.5 * float(np.linalg.slogdet(information)[1]) / math.log(2.0)
 
     def _taken(self, name: str, rivals: Mask) -> Array:
-        """Part of an effect's squared signature that each column takes at the size that suits it
-        best; nothing of those that are no rivals or do not show.
-        """
+        """Part of an effect's squared signature that each rival column takes at its best size."""
         showing = rivals & (self._power > _NOTHING**2)
         shared = self._free[self._best[name]] ** 2
         return np.where(showing, shared, 0.0) / np.maximum(self._power, _NOTHING**2)
 
     def _limit(self, start: Start, left: float, where: tuple[str, str]) -> Limit:
-        """That of the start of an effect that shows most."""
+        """Limit of an effect by the one of its starts that shows most."""
         name = str(start.effect)
         power = float(self._power[self._best[name]])
         if left < _NOTHING or power <= 0.0:
@@ -313,8 +309,8 @@ class Limits:
 
 
 def _sized(start: Start, size: float) -> float:
-    """Leading parameter of an effect so many times its start's size; NaN where its bounds hold it,
-    or nobody would look for so much.
+    """Leading parameter of an effect at a multiple of its start's size; NaN where its bounds hold
+    it, or nobody would search for so much.
     """
     leading = start.sizes[0]
     found = start.scaled(size).free[leading]

@@ -1,5 +1,5 @@
-"""What a diagnosis does with a case before it fits anything: units, dead and swapped channels,
-impossible samples, copies, and the blocks that what was recorded surrounds.
+"""Checks of a case before any fit: units, dead and swapped channels, impossible samples, copies,
+and the blocks that the recorded channels surround.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Ready:
 
 
 def readied(case: Case, settings: DiagnosisSettings) -> Ready:
-    """Look at a case before anything is fitted.
+    """Check a case before anything is fitted.
 
     Parameters
     ----------
@@ -162,9 +162,7 @@ def _check_rig(case: Case) -> None:
 
 
 def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
-    """The case with the rig that its recordings were made on as far as that is known before any
-    fit, and what that is, in words.
-    """
+    """Case with the rig as far as it is known before any fit, and sentences on that."""
     rig, said = at_ambient(case.rig, case.recordings, settings)
     told = [*said, *_said_of_held(rig), *_said_of_inlets(rig, case.channels)]
     return replace(case, rig=without_passing(rig)), told
@@ -173,9 +171,7 @@ def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
 def _sound(
     case: Case, settings: DiagnosisSettings
 ) -> tuple[Case, list[Faulty], list[str], list[str]]:
-    """The case with what its recordings cannot have measured masked or left out; what is said of
-    sensors whose range ends, of copies, and of the rest.
-    """
+    """Case with impossible samples masked; faults of sensors, copies, and other notes."""
     kept, clipped = without_rails(case.recordings)
     kept, masked = without_impossible(kept, case.rig, settings)
     kept, copies = without_copies(kept)
@@ -201,7 +197,7 @@ def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
 
 
 def _said_of_held(rig: Rig) -> list[str]:
-    """What the model holds already, and what of it cannot be held, in words."""
+    """Sentences on effects that the model holds already, and on those that it cannot hold."""
 
     def told(entry: dict[str, Any]) -> str:
         place = f" at {entry['at']}" if "at" in entry else ""

@@ -1,6 +1,4 @@
-"""What a diagnosis returns: verdict, location, named physics, fit, traces; as text, JSON and
-pages.
-"""
+"""Result of a diagnosis: verdict, location, named physics, fit, traces; as text, JSON and pages."""
 
 from __future__ import annotations
 
@@ -270,7 +268,7 @@ class Diagnosis(View, Findings):
 
 
 def _draw_trace(axes: Any, trace: Trace) -> None:
-    """A channel as measured, by the rig file, and by the model with what was found."""
+    """Draw a channel as measured, by the rig file's model, and by the model with what was found."""
     unit, factor = laboratory_unit(trace.channel)
     own = ("black", *COLOURS[1::-1])
     kinds = ("measured", "before", "after")

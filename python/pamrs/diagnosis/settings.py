@@ -1,4 +1,4 @@
-"""What a user may have a reason to change in a diagnosis: each with unit, reason and origin.
+"""Settings of a diagnosis that a user may have a reason to change, with unit, reason and origin.
 
 They are passed to :func:`pamrs.diagnose`; its result holds those that differ from the defaults.
 All other numbers that steer a verdict are constants of the modules that use them. A reason that
@@ -379,7 +379,7 @@ class DiagnosisSettings:
 
 
 def _checked(field: dataclasses.Field[Any], value: Any) -> float:
-    """The value if it is of the right kind and inside its range."""
+    """Value of a setting, checked for its kind and range."""
     meta, whole = field.metadata, isinstance(field.default, int)
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if (

@@ -1,6 +1,4 @@
-"""The mismatch budget of each block: what of the nominal model's excess over the noise each term
-takes, and what stays unexplained.
-"""
+"""Mismatch budget of each block: shares of the nominal model's excess that each term takes."""
 
 from __future__ import annotations
 
@@ -134,7 +132,7 @@ def budget(
 
 @dataclass(frozen=True)
 class _Stage:
-    """A step of one block: as in `_Step`, against its noise; and whether it acts there."""
+    """Step of one block's budget against the noise; `acts` is true where the step acts there."""
 
     kind: str
     terms: tuple[Term, ...]
@@ -184,7 +182,7 @@ def _steps(
 
 
 def _difference(one: Residuals, other: Residuals) -> Residuals:
-    """By how much two models' predictions differ."""
+    """Difference of two models' predictions, by block and recording."""
     return {
         key: replace(r, value=np.where(r.rows, other[key].value - r.value, 0.0))
         for key, r in one.items()
@@ -220,9 +218,7 @@ def _without_held(
 
 
 def _in_order(judged: Judged) -> tuple[tuple[Term, ...], ...]:
-    """What a group names, step by step: all wrong parameters, then each effect, the one that leaves
-    least by itself first.
-    """
+    """Terms that a group names in steps: all wrong parameters, then effects, best alone first."""
     alone = {
         c.effects[0]: sum(e.ratio for e in c.held_out.values())
         for c in judged.group.candidates
@@ -283,7 +279,7 @@ def _terms(
 
 
 def _values(terms: Sequence[Term], judged: Judged) -> dict[str, EffectParameterFound]:
-    """What the recordings say of a step: values of the effect, or of the wrong parameters, SI."""
+    """Fitted values of a step's effect or wrong parameters, SI."""
     found = judged.chosen.fit
     out = {}
     for name, value in found.values.items():
@@ -334,8 +330,8 @@ class _Shares:
         return np.asarray(self._weights @ np.array([ratio - noise for ratio, _ in one.pieces]))
 
     def _divided(self, names: list[_Stage]) -> list[Array]:
-        """Parts of names in what they take together, in proportion to the squares of what each
-        changes in the prediction; a name that does not act here has none.
+        """Shares of names in what they take together, by the squares of what each changes in the
+        prediction; equal where a name cannot be taken away, none where it does not act.
         """
         none = np.zeros(len(self._weights))
         changes = [
@@ -370,9 +366,9 @@ class _Shares:
 
 
 def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
-    """The group that tells most of each parameter that several have (sensors' zeros): the one with
-    the least standard deviation; of those that tell hardly more than the file, the last one along
-    the chain, whose output it is.
+    """Number of the group that determines each parameter best, where several have it (sensors'
+    zeros): the one with the least standard deviation; of those that tell hardly more than the file,
+    the last one along the chain, whose output it is.
 
     What a group leaves without a name is in its autocorrelation, and so in its standard deviations.
     Events are fitted with the values beside them, which stay.
@@ -392,8 +388,8 @@ def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
 
 
 def owners_of_effects(candidates: list[Candidate]) -> dict[Term, int]:
-    """The group that tells most of each effect that several have (a clock moves what arm and
-    chamber see): the one whose standard deviations are least, on the average of their logarithms.
+    """Number of the group that determines each effect best, where several have it (a clock moves
+    what arm and chamber see): the one with the least mean logarithm of standard deviations.
     """
     found: dict[Term, int] = {}
     for k, candidate in enumerate(candidates):
@@ -405,9 +401,7 @@ def owners_of_effects(candidates: list[Candidate]) -> dict[Term, int]:
 
 
 def _doubt(candidate: Candidate, effect: Term) -> float:
-    """How little a fit tells of an effect: mean logarithm of the standard deviations of its
-    parameters, in units of their typical sizes.
-    """
+    """Mean logarithm of the standard deviations of an effect's parameters, in typical sizes."""
     std = candidate.fit.std
     logs = []
     for name in candidate.fit.values:

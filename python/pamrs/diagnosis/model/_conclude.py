@@ -1,6 +1,4 @@
-"""From judged groups of blocks to one model: what each fitted is merged, and what is left at every
-stage, alone and in the whole rig.
-"""
+"""One model from the judged groups of blocks, and its residuals at every stage."""
 
 from __future__ import annotations
 
@@ -71,7 +69,7 @@ _SPOILED = 1.2  # error of a channel over that of the model before, from which i
 
 @dataclass(frozen=True, eq=False)
 class Models:
-    """The rig at every stage.
+    """Nominal, refitted and final rig, with the judged groups and fits that they come from.
 
     Attributes
     ----------
@@ -99,12 +97,12 @@ class Models:
 
     @property
     def added(self) -> bool:
-        """Whether the model has effects that the nominal one does not hold."""
+        """True where the final model has effects that the nominal one does not hold."""
         return len(self.final.effects) > len(self.nominal.effects)
 
     @property
     def events(self) -> Events | None:
-        """What happened in single recordings."""
+        """Events of single recordings in the final model; None without any."""
         happened = (c.fit.events for c in self.chosen if c.fit.events is not None)
         return next(happened, None) if self.added else None
 
@@ -119,7 +117,8 @@ class Models:
 
 @dataclass(frozen=True, eq=False)
 class Conclusion:
-    """What was found, as numbers.
+    """Numbers that a diagnosis comes to: models, probabilities, residuals, errors, budget, free
+    runs.
 
     Attributes
     ----------
@@ -179,7 +178,7 @@ class Conclusion:
 
 
 def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGroup]) -> Conclusion:
-    """Merge what the groups of blocks found into one model, and see what that leaves.
+    """Merge what the groups of blocks found into one model, and compute what it leaves.
 
     Parameters
     ----------
@@ -219,7 +218,7 @@ def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGro
 
 
 def _own_errors(problem: Problem, noise_level: dict[Key, NoiseLevel]) -> dict[str, float]:
-    """What the error that is taken for the model's own does to each channel [SI]."""
+    """Standard deviation of each channel by the error that is taken for the model's own [SI]."""
     found = {}
     for block in problem.blocks:
         levels = [noise_level[block.name, p.recording.name] for p in problem.recordings]
@@ -234,13 +233,13 @@ def _sound_models(
     groups: list[BlockGroup],
     noise_level: dict[Key, NoiseLevel],
 ) -> tuple[Models, dict[str, dict[Key, Residual]], dict[str, dict[Key, Residual]]]:
-    """The rig at every stage with answers that its errors bear out, and the residuals of the
-    recordings to fit and of the held-out ones.
+    """Rig at every stage, after answers that its errors contradict are taken out; residuals of
+    fitted and of held-out recordings.
 
-    What leads a group and predicts a channel worse than the model without it does, its blocks worse
-    than the model of the rig file, or calls a value wrong that the model has inside its tolerances,
-    is put aside; that nothing is missing is, where the model misses far more than noise and its own
-    error. The group is judged again without it.
+    The name or form that leads a group is taken out, and the group judged again, where the model
+    predicts a channel worse with it than without, its blocks worse than the rig file's model, or
+    where a value called wrong is inside its tolerances. The answer that nothing is missing is taken
+    out where the model misses far more than noise and its own error.
     """
     settings, errors = fitted.settings, _own_errors(fitted, noise_level)
     groups = [drop_undetermined(group, fitted) for group in groups]
@@ -263,9 +262,7 @@ def _sound_models(
 
 
 def _needless(models: Models, settings: DiagnosisSettings) -> set[int]:
-    """Groups that call a value wrong which is inside its tolerances as the group has it that knows
-    it best.
-    """
+    """Groups, by number, that call a value wrong which is inside its tolerances after all."""
     return {
         k
         for k, judged in enumerate(models.judged)
@@ -275,7 +272,7 @@ def _needless(models: Models, settings: DiagnosisSettings) -> set[int]:
 
 
 def _without_name(group: BlockGroup, judged: Judged) -> BlockGroup:
-    """A group without what it adds to the model: its name, or the form of what has none."""
+    """Group without what it adds to the model: its name, or the form of what has none."""
     if judged.added:
         return put_aside(group, judged.chosen.hypothesis)
     return replace(group, closure=None)
@@ -284,8 +281,8 @@ def _without_name(group: BlockGroup, judged: Judged) -> BlockGroup:
 def _worse_than_file(
     judged: list[Judged], table: dict[str, ChannelError], margin: float
 ) -> set[int]:
-    """Groups whose names predict the blocks in which they act worse than the model of the rig file,
-    by more than this share of the noise's variance.
+    """Groups, by number, whose names predict the blocks in which they act worse than the model of
+    the rig file, by more than `margin` of the noise's variance.
     """
     found = set()
     for k, one in enumerate(judged):
@@ -316,7 +313,7 @@ def _missed(
 
 
 def _with_mismatch(group: BlockGroup, missed: list[Block]) -> BlockGroup:
-    """A group of which something is missing after all: nobody looked for its name."""
+    """Group changed to ``unlisted``, with the missed blocks as its suspects."""
     if not missed:
         return group
     chances = dict(group.probabilities)
@@ -368,9 +365,7 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
 
 
 def _known(models: Models) -> KnownValues:
-    """What is known of the values of the final model: as they were fitted, with what goes together,
-    and of others what the rig file says.
-    """
+    """Values of the final model with a root of their covariance: fitted, else of the rig file."""
     of_file = {n: p for n, p in known_parameters(models.nominal).items() if p.tol > 0}
     names, values, parts = list[str](), list[float](), list[Array]()
     for k, candidate in enumerate(models.chosen):
@@ -391,18 +386,14 @@ def _known(models: Models) -> KnownValues:
 
 
 def _model_of(judged: Judged, start: Candidate) -> Candidate:
-    """What of a group goes into the model: what is named, or a form of what has no name, or
-    parameters alone.
-    """
+    """Candidate of a group for the model: what is named, else a nameless form, else parameters."""
     if judged.named or judged.wrong:
         return judged.chosen
     return (judged.group.closure if judged.verdict == "unlisted" else None) or start
 
 
 def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:
-    """Residuals of a model; what happened in single recordings in the place of what its file
-    says.
-    """
+    """Residuals of a model, with events of single recordings instead of its own such effect."""
     return residuals(
         problem, rig if events is None else without_term(rig, events.effect), (), events
     )
@@ -450,8 +441,7 @@ def _inside(group: BlockGroup, wanted: frozenset[Term]) -> Candidate:
 def _settled(
     nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]
 ) -> list[Candidate]:
-    """The fits of the groups again, with what another group knows better (the sensors' zeros) held,
-    where theirs are others.
+    """Refit groups with sensors' zeros held that another group determines better and differently.
 
     A rig has one zero of a sensor; the other values of a fit are right beside its own only.
     """

@@ -1,6 +1,4 @@
-"""The whole rig simulated from its commands alone, beside the chain that is cut at what was
-measured: what each block's error comes to when nothing measured corrects it.
-"""
+"""Simulation of the whole rig from its commands alone, and its error by channel."""
 
 from __future__ import annotations
 
@@ -45,7 +43,7 @@ _OFF_STEPS = 2
 
 @dataclass(frozen=True, eq=False)
 class KnownValues:
-    """What is known of the values of a rig.
+    """Values of a rig, with a root of their covariance.
 
     Attributes
     ----------
@@ -187,7 +185,7 @@ def _judged(
     final: Rig,
     known: KnownValues | None,
 ) -> FreeRun:
-    """A free run with what it misses by more than noise and what is known of the values explain.
+    """Free run with its channels marked that noise and uncertain values do not explain.
 
     A motion that its block follows from the measured pressures has its miss from the pressures of
     the run: it is off where one of them is.
@@ -230,9 +228,8 @@ def _left(
     known: KnownValues,
     noise: Mapping[str, float],
 ) -> dict[str, float]:
-    """What a free run misses of each channel [noise levels], at the least, where the values of the
-    rig are as far from what is known of them as is likely, its commands come up to a sample earlier
-    or later, and its gases begin warmer or colder.
+    """Least error of a free run by channel [noise levels], over likely values of the rig, commands
+    up to a sample earlier or later, and gases that begin warmer or colder.
 
     Steps of Gauss and Newton inside that distance, each tried by a simulation.
     """
@@ -264,9 +261,7 @@ def _moved(
     at: Array,
     now: dict[str, Array],
 ) -> Array:
-    """Values, as likely as they may be, at which what a free run misses is least, as far as it is
-    linear in them.
-    """
+    """Values within their likely distance at which a linearised free run misses least."""
     here = np.concatenate(list(now.values()))
     slopes = np.zeros((here.size, at.size))
     for k in range(at.size):
@@ -299,8 +294,8 @@ class _Begins(NamedTuple):
 
 
 def _begun(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
-    """Where each gas with a balance of energy begins, by its chamber: as warm as the room, but
-    where its thermometer or its pressure says clearly that it does not.
+    """Temperature at which each gas with a balance of energy begins, by chamber: that of the room,
+    but where its thermometer or its pressure clearly says otherwise.
     """
     own = prepared.settings
     room, found = float(rig.tables("gas")[""]["temperature"]), {}
@@ -330,9 +325,7 @@ def _misses(
     noise: Mapping[str, float],
     most: int,
 ) -> dict[str, Array]:
-    """What a free run misses of each measured channel, in units of its noise, at about so many
-    samples at the most.
-    """
+    """Errors of a free run by measured channel, in units of its noise, at some `most` samples."""
     result = replay(rig, driving, temperatures=begins, record=_measured(rig, logged))
     out = {}
     for name in differences(result, logged):

@@ -1,4 +1,4 @@
-"""What to record next, and what some channels could tell before anything is recorded.
+"""Choice of the next experiment, and plans: what some channels could show before any recording.
 
 Public: `next_to_record` (what a diagnosis asks for), `propose` (experiments compared), `Plan`,
 `plan_diagnosis` and `measurable` (before there are data). What a person can record at all is in

@@ -1,6 +1,4 @@
-"""What to record next: simulated with every hypothesis that has a model, where two or more are
-left; else by the block in which the mismatch is, as commands that the rig can play.
-"""
+"""Next experiment of a diagnosis, by simulation where hypotheses have models, else by block."""
 
 from __future__ import annotations
 
@@ -39,7 +37,7 @@ from pamrs.simulation import has_frame, regulators_of
 
 @dataclass(frozen=True)
 class _Telling:
-    """What tells most about a block whatever is missing there.
+    """Experiment that shows most about a block, whatever is missing there.
 
     Attributes
     ----------
@@ -63,8 +61,8 @@ _TELLINGS = {name: _Telling(**own) for name, own in words("telling").items()}
 
 
 def _telling(block: Block, rig: Rig, terms: Iterable[Term] = ()) -> _Telling:
-    """What tells most about a block of a rig: about some terms that are open there, as far as the
-    catalogue says what tells them, else whatever is missing.
+    """Experiment that shows most about a block of a rig: of the terms that are open there, as far
+    as the catalogue names one for them, else of whatever is missing.
     """
     if block.mechanical:
         return _TELLINGS["strokes" if has_frame(rig) else "loops"]
@@ -105,7 +103,7 @@ def _joining(block: Block, rig: Rig) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _Question:
-    """What is asked of a next experiment.
+    """Models, blocks and recordings from which a next experiment is chosen.
 
     Attributes
     ----------
@@ -160,8 +158,8 @@ class _Question:
     def experiment(
         self, block: Block, open_: Iterable[Term] = ()
     ) -> tuple[str, str, Experiment | None]:
-        """What to do about a block, of which some terms are open, what it shows, and the experiment
-        where the library makes it for this rig.
+        """Words on what to do about a block with some open terms, words on what that shows, and the
+        experiment where the library makes it for this rig.
         """
         telling, rig = _telling(block, self.nominal, open_), self.nominal
         names = [telling.kind]
@@ -173,7 +171,7 @@ class _Question:
         return telling.text if made is None else made.text, telling.shows, made
 
     def answer(self, begin: str, block: Block, terms: Iterable[Term] = ()) -> NextExperiment:
-        """What to record about a block, behind the words that say why."""
+        """Next experiment about a block, after words that say why."""
         what, shows, experiment = self.experiment(block, terms)
         kind = {"kind": _telling(block, self.nominal, terms).kind, "block": block.name}
         text, instruction = f"{begin}: {what}; {shows}.", f"{capital(what)}."
@@ -206,7 +204,7 @@ def next_to_record(
     fitted: Problem,
     held: Problem,
 ) -> NextExperiment:
-    """What to record next.
+    """Choose what to record next.
 
     Parameters
     ----------
@@ -268,7 +266,7 @@ def _first_asked(answer: Answer) -> Part | None:
 
 
 def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
-    """What to record where no two hypotheses could be simulated."""
+    """Next experiment where no two hypotheses could be simulated."""
     answer = diagnosis.answer
     part = _first_asked(answer)
     nameless = part is not None and part.group.verdict == "unlisted"
@@ -292,9 +290,8 @@ def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
 
 
 def _of_whole(asked: _Question, diagnosis: Findings) -> NextExperiment:
-    """What to record where the blocks fit one by one and the whole rig misses channels: about the
-    block that keeps more than noise, or else the first one along the chain, from which the error
-    goes on to the others.
+    """Next experiment where the blocks fit one by one and the whole rig misses channels: about the
+    block that keeps more than noise, or else the first along the chain, where the error begins.
     """
     off = [own.channel for own in diagnosis.answer.missed]
     there = [b for b in asked.blocks if b.channel in off]
@@ -315,8 +312,8 @@ def _pairs(
     hypotheses: Sequence[Modelled],
     known: Sequence[PairExperiment],
 ) -> list[PairExperiment]:
-    """What tells each two of the sets that are left open from each other; that something else is
-    missing beside a name is a question by itself.
+    """Experiments that separate each two of the open sets; that something without a name is missing
+    as well is a question of its own.
     """
     alone = [Hypothesis(h.terms) if h.terms else h for h in ambiguity]
     alone += [UNLISTED for h in ambiguity if h.rest == UNLISTED.rest]
@@ -333,7 +330,7 @@ def _pairs(
 
 
 def _same(labels: Sequence[str], pair: Sequence[Hypothesis]) -> bool:
-    """Whether two texts are of the two hypotheses of a pair."""
+    """True where two labels are those of a pair of hypotheses, `PARAMETERS` counted as `NONE`."""
     # whether parameters moved inside their tolerances is no other answer
     one, other = (
         {NONE if hypothesis == PARAMETERS else hypothesis for hypothesis in several}
@@ -345,7 +342,7 @@ def _same(labels: Sequence[str], pair: Sequence[Hypothesis]) -> bool:
 def _pair(
     asked: _Question, one: Hypothesis, other: Hypothesis, hypotheses: Sequence[Modelled]
 ) -> PairExperiment:
-    """What tells two hypotheses apart that were not both simulated."""
+    """Experiment that separates two hypotheses of which not both were simulated."""
     labels = [str(one), str(other)]
     same = same_data([one, other])
     if same:
@@ -393,8 +390,8 @@ def _missed_without(
     hypotheses: Sequence[Modelled],
     experiment: Experiment | None,
 ) -> tuple[str, float] | None:
-    """What a model without some terms misses of what they do in an experiment: channel and noise
-    levels; None where it cannot be simulated.
+    """Channel and noise levels by which a model without some terms misses an experiment; None where
+    it cannot be simulated.
     """
     models = ((Hypothesis.parse(label), rig) for label, rig, _ in hypotheses)
     own = next((rig for known, rig in models if terms and terms <= known.set), None)
@@ -414,7 +411,7 @@ def _missed_without(
 
 
 def _measured(values: Sequence[Term], rig: Rig) -> str:
-    """How values of the rig file are told from what looks like them."""
+    """Sentence that asks to measure values of the rig file by themselves."""
     ways, told = words("measured"), list[str]()
     for term in values:
         known = rig.parameters.get(term.id)
@@ -427,9 +424,7 @@ def _measured(values: Sequence[Term], rig: Rig) -> str:
 
 
 def same_data(ambiguity: list[Hypothesis]) -> str:
-    """What tells the two most probable hypotheses apart where they are the same data; empty where
-    they are not.
-    """
+    """Words on what separates the two likeliest hypotheses if they are the same data, or empty."""
     for one, other in itertools.permutations(ambiguity[:2], 2):
         for term in one.terms if one.rest == other.rest else ():
             for same in term.info.same_data if term.is_effect else ():

@@ -1,5 +1,5 @@
-"""The next experiment: each one that the rig can do, simulated with every hypothesis that survives,
-and what it would tell.
+"""Next experiment: each one that the rig can do, simulated with every hypothesis that is left, and
+the information that it would give.
 
 Every hypothesis answers to the same commands. Its answer becomes a recording without noise, and
 every other hypothesis has to explain it through the cut chain, its own parameters and the
@@ -62,7 +62,7 @@ Modelled = tuple[str, Rig, float]
 
 
 def entropy(probabilities: Sequence[float]) -> float:
-    """Doubt about the model [bit]; probabilities need not add to one."""
+    """Entropy of probabilities, which need not add to one [bit]."""
     total = sum(probabilities)
     return -sum(p / total * math.log2(p / total) for p in probabilities if p > 0.0)
 
@@ -96,7 +96,7 @@ def information(probabilities: Sequence[float], distance: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What an experiment is expected to give.
+    """Outcome of an experiment, simulated with every hypothesis, and its expected information.
 
     Attributes
     ----------
@@ -139,8 +139,9 @@ class Outcome:
         return self.problems[0]
 
     def exactly(self, pairs: Sequence[tuple[int, int]], probabilities: Sequence[float]) -> Outcome:
-        """The same, what j leaves of the outcome of i worked out with the sensitivities that j has
-        there, for some pairs of hypotheses (i, j) with these probabilities.
+        """Outcome in which what j leaves of the outcome of i is computed anew, with the
+        sensitivities that j has there, for some pairs (i, j) of hypotheses with these
+        probabilities.
         """
 
         def missed(pair: tuple[int, int]) -> Left:
@@ -246,8 +247,8 @@ def outcome_of(
 
 
 def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float]) -> list[Outcome]:
-    """Outcomes by what they tell, the most telling first; of those that tell the same, the
-    cheapest. What takes something that the rig file does not say to be there comes last.
+    """Outcomes by their information, the largest first; of those with the same, the cheapest. An
+    experiment that needs what the rig file does not list comes last.
 
     Parameters
     ----------
@@ -277,7 +278,7 @@ def propose(
     settings: DiagnosisSettings | None = None,
     losses: Losses | None = None,
 ) -> NextExperiment:
-    """The experiment that tells most about which hypothesis holds.
+    """Choose the experiment that tells most about which hypothesis holds.
 
     Parameters
     ----------
@@ -393,7 +394,7 @@ def propose(
 
 
 def _simulated(experiment: Experiment, hypotheses: Sequence[Modelled]) -> list[Simulation] | None:
-    """An experiment with every hypothesis; None where one of them cannot be run there."""
+    """Simulate an experiment with every hypothesis; None where one of them cannot be run there."""
     try:
         return two_at_a_time(experiment.simulate, [rig for _, rig, _ in hypotheses])
     except SimulationError:
@@ -401,8 +402,8 @@ def _simulated(experiment: Experiment, hypotheses: Sequence[Modelled]) -> list[S
 
 
 def apart(outcome: Outcome, i: int, j: int, *, nested: bool = False) -> tuple[str, float]:
-    """How far an experiment tells two hypotheses apart: the channel, and what the one misses of
-    what the other predicts, its parameters fitted again [noise levels].
+    """Channel, and distance [noise levels], by which an experiment separates two hypotheses: what
+    one misses of the other's prediction after its parameters are fitted again.
 
     That is the smaller of both ways; where the one is a case of the other (``nested``), and can
     miss nothing, the larger.
@@ -420,13 +421,13 @@ def _largest(outcome: Outcome, i: int, j: int) -> tuple[str, float]:
 
 
 def _nested(one: Rig, other: Rig) -> bool:
-    """Whether the one model has every effect of the other."""
+    """True where one of two models has every effect of the other."""
     first, second = (set(map(Term.of, rig.effects)) for rig in (one, other))
     return first <= second or second <= first
 
 
 def _pairs(outcomes: Sequence[Outcome], hypotheses: Sequence[Modelled]) -> list[PairExperiment]:
-    """For every two hypotheses the experiment that tells most of these two, by what is there."""
+    """Experiment that separates each two hypotheses most, by what is there."""
     there = [o for o in outcomes if not (o.experiment.needs or o.sensor)] or list(outcomes)
     found = []
     for i, j in itertools.combinations(range(len(hypotheses)), 2):
@@ -447,22 +448,20 @@ def _pairs(outcomes: Sequence[Outcome], hypotheses: Sequence[Modelled]) -> list[
 
 
 def _missed(outcome: Outcome, i: int, j: int) -> str:
-    """What hypothesis j misses of what hypothesis i predicts, in words."""
+    """Words on what hypothesis j misses of the prediction of hypothesis i."""
     channel, size = _largest(outcome, i, j)
     return f"{spoken_name(channel)} by {size:.2g} times the noise level"
 
 
 def _instruction(outcome: Outcome) -> str:
-    """What to record, and with which further sensor, in words."""
+    """Words on what to record, and with which further sensor."""
     text = outcome.experiment.text
     sensor = f", with one more channel: {spoken_name(outcome.sensor)}" if outcome.sensor else ""
     return f"{text[:1].upper()}{text[1:]}{sensor}"
 
 
 def _with_more(best: Outcome, best_first: Sequence[Outcome]) -> str:
-    """What an experiment would tell that takes something which the rig file does not list, where
-    that is more; else nothing.
-    """
+    """Words on a better experiment that takes what the rig file does not list; else empty."""
     others = [o for o in best_first if o.experiment.needs and o.bits > best.bits + _RESOLUTION]
     if best.experiment.needs or not others:
         return ""

@@ -1,5 +1,4 @@
-"""What a change of the model leaves in the cut chain when everything else that is free has been
-fitted again.
+"""Differences between models in the cut chain, after all free parameters are fitted again.
 
 Residuals are counted in bins of 0.1 s in units of the noise level that the noise of the sensors
 (output and drives) leaves there, and a recording as a modest number of independent ones: errors of
@@ -189,8 +188,8 @@ def problem_of(
 
 
 def judged_alike(problems: Sequence[Problem]) -> list[Problem]:
-    """The same problems, whose recordings of one experiment are judged from the same sample on: the
-    last one at which any of them still depends on a beginning that nobody measured.
+    """Problems whose recordings of one experiment are judged from the same sample on: the last one
+    at which any of them still depends on a beginning that nobody measured.
     """
     latest: dict[str, int] = {}
     for prepared in (p for problem in problems for p in problem.recordings):
@@ -206,7 +205,7 @@ def judged_alike(problems: Sequence[Problem]) -> list[Problem]:
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """What stays of a difference.
+    """Difference between a model and recordings after its free parameters are fitted out.
 
     Attributes
     ----------
@@ -224,7 +223,7 @@ class Left:
 
     @property
     def largest(self) -> tuple[Key, float]:
-        """Where it is largest, and how large [noise levels]."""
+        """Block and recording with the largest difference, and that difference [noise levels]."""
         key = max(self.rms, key=lambda k: self.rms[k])
         return key, self.rms[key]
 
@@ -261,7 +260,7 @@ def _free(problem: Problem, rig: Rig) -> dict[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """A model near to some recordings.
+    """Model linearised about some recordings.
 
     Attributes
     ----------
@@ -285,13 +284,13 @@ def linear(problem: Problem, rig: Rig) -> Linear:
 
 
 def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> Left:
-    """What a model leaves of recordings after its free parameters have moved as far as they may."""
+    """Difference of a model from recordings after its free parameters moved as far as they may."""
     return _left(problem, {key: r.value for key, r in model.found.items()}, model, weights)
 
 
 def elsewhere(problem: Problem, model: Linear) -> Linear:
-    """A model on other recordings of the same experiment, with the sensitivities that it has on its
-    own: where the two differ by so much that these are others, they are told apart anyway.
+    """Model on other recordings of the experiment, with the sensitivities of its own: where these
+    would differ much, the two are separated anyway.
     """
     found = {
         key: replace(r, jacobian=model.found[key].jacobian)
@@ -303,7 +302,7 @@ def elsewhere(problem: Problem, model: Linear) -> Linear:
 def difference(
     problem: Problem, truth: Mapping[Key, Residual], other: Linear, weights: Mapping[Key, float]
 ) -> Left:
-    """What a model leaves of the recordings that another one makes.
+    """Difference of a model from the recordings that another one makes, free parameters fitted out.
 
     Parameters
     ----------
@@ -328,8 +327,8 @@ def bins_of_fit(
     found: Residual,
     weights: Mapping[Key, float],
 ) -> tuple[Array, float]:
-    """Sensitivities of a block in bins of the fit, and what makes noise levels of their units, as
-    many independent ones as the recording counts for.
+    """Sensitivities of a block in bins of the fit, and the factor that makes noise levels of their
+    units, for as many independent ones as the recording counts for.
     """
     jacobian = found.jacobian
     slope, counts = binned(

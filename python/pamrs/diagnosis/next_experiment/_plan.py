@@ -15,7 +15,7 @@ from pamrs.rig import Units
 
 @dataclass(frozen=True)
 class Addition:
-    """What one more channel or experiment would add.
+    """Gain of one more channel or experiment.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Addition:
 
 @dataclass(frozen=True, repr=False)
 class Plan:
-    """What some channels and experiments can tell of a rig.
+    """Limits, blocks and pairs of effects that some channels and experiments show of a rig.
 
     Attributes
     ----------
@@ -88,7 +88,8 @@ class Plan:
         return tuple(own.effect for own in self.limits if own.verdict != "not seen")
 
     def limit(self, effect: str) -> Limit:
-        """From which size on one effect would be seen, and told from its nearest rival.
+        """Limits of one effect: the sizes from which it would be seen, and told from its nearest
+        rival.
 
         Parameters
         ----------
@@ -114,8 +115,7 @@ class Plan:
         return found
 
     def separable(self, first: str, second: str) -> bool:
-        """Whether two effects that are seen would be told apart; False when one of them is not
-        seen.
+        """True where two effects are both seen and would be told apart.
 
         Parameters
         ----------
@@ -256,7 +256,7 @@ class Plan:
         ]
 
     def _gains(self) -> list[str]:
-        """What would add most."""
+        """Lines on the channels and experiments that would add most."""
         lines = []
         if self.additions:
             lines += ["", "What would add most"]

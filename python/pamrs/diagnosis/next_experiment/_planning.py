@@ -1,5 +1,5 @@
-"""Before any data: which blocks some channels tell apart, which effects they show, and which they
-cannot tell from each other: the limits of a few standard experiments, which are simulated.
+"""Plans before any data: blocks that some channels tell apart, effects that they show, and effects
+that they cannot tell from each other, by a few standard experiments that are simulated.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def plan_diagnosis(
     settings: DiagnosisSettings | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> Plan:
-    """What a diagnosis could tell of a rig from some channels, before anything is recorded.
+    """Plan a diagnosis: what it could tell of a rig from some channels, before any recording.
 
     Parameters
     ----------
@@ -157,9 +157,7 @@ def plan_diagnosis(
 
 @dataclass(frozen=True, eq=False)
 class _Assumed:
-    """What every block shows over every experiment, to be looked at with some channels and some
-    experiments.
-    """
+    """Products of every block over every experiment, for limits by fewer of them."""
 
     rig: Rig
     products: Products
@@ -196,9 +194,7 @@ class _Assumed:
         chosen: list[str],
         usable: Mapping[str, Experiment],
     ) -> list[Addition]:
-        """What each further channel (two of them where one surrounds no block) and each further
-        experiment would add.
-        """
+        """Gains of each further channel (of two where one surrounds no block) and experiment."""
         blocks = self.blocks(own)
         now = self.limits(blocks, chosen)
         lacking = [c for c in every if c not in own]

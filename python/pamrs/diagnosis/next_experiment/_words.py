@@ -1,4 +1,4 @@
-"""What is asked of a next experiment and said of a plan, as ``words.toml`` has it."""
+"""Texts on next experiments and plans, from ``words.toml``."""
 
 from __future__ import annotations
 

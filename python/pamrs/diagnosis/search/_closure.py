@@ -1,5 +1,4 @@
-"""What a mismatch is a function of, where no catalogue entry explains it: a sparse closure at the
-located cut.
+"""Sparse closure at the located cut: the fitted form of a mismatch that no effect explains.
 
 A closure is linear in its coefficients, so that at zero (where it changes nothing) one evaluation
 gives what every term of its dictionary would do to the residuals, and a few more what those with
@@ -233,8 +232,8 @@ def _again(
     blocks: list[Block],
     closures: dict[str, str],
 ) -> tuple[list[_ShapedTerm], Array, Fit]:
-    """The same at a fitted closure, every memory as it is there; and the baseline there, with
-    sensitivities beside the closure.
+    """Terms and columns as of `_at_zero`, at a fitted closure with its memories; and the baseline
+    there, with sensitivities next to the closure.
     """
     rig = found.rig
     for closure in closures.values():
@@ -269,7 +268,7 @@ def _again(
 
 @dataclass(frozen=True, eq=False)
 class _Stacked:
-    """Stacked residuals of a fit with what the baseline can do beside a closure.
+    """Stacked residuals of a fit, with what the baseline can do next to a closure.
 
     Attributes
     ----------
@@ -341,8 +340,8 @@ def _price(samples: float, among: int) -> float:
 def _better(
     models: list[Fit], problem: Problem, inflation: dict[str, float], among: int
 ) -> Fit | None:
-    """The model that is worth most by misfit and price, all on the independent samples of that with
-    the least misfit; None for the first.
+    """Best model by misfit and price, on the independent samples of the least misfit; None for the
+    first.
 
     Parameters
     ----------
@@ -455,7 +454,7 @@ class _Selection:
         return float(self.left @ self.left)
 
     def power(self, k: int) -> float:
-        """How much of a term is not yet explained by those taken."""
+        """Squared length of a term's part that the terms taken before do not explain."""
         return float(self._free[:, k] @ self._free[:, k])
 
     def take(self, k: int) -> None:

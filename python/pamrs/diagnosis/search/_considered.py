@@ -10,9 +10,7 @@ from pamrs.effects import Hypothesis, Term
 
 
 def fit_considered(search: Search) -> list[Candidate]:
-    """What of the hypotheses that the caller asks for acts in the blocks of a mismatch, the terms
-    of each fitted together.
-    """
+    """Fit what of each hypothesis that the caller asks for acts in the blocks of a mismatch."""
     trial, found = search.trial, list[Candidate]()
     for asked in trial.inner.considered:
         acting = [t for t in asked.terms if any(concerns(t, b) for b in trial.suspects)]
@@ -33,9 +31,7 @@ def fit_considered(search: Search) -> list[Candidate]:
 
 
 def _add_effect(search: Search, beside: Candidate, effect: Term) -> Candidate | None:
-    """An effect beside a set, from the start of each of its forms that leaves least after a few
-    steps.
-    """
+    """Add an effect to a set, from the start of each form that leaves least in a few steps."""
     info, trial = effect.info, search.trial
     if beside.fit.events is not None:
         return None  # beside events nothing else is fitted
@@ -55,8 +51,8 @@ def _add_effect(search: Search, beside: Candidate, effect: Term) -> Candidate | 
 
 
 def _possible_starts(search: Search, beside: Candidate, effect: Term) -> list[Start]:
-    """Where an effect may begin beside a set: those of the screen, which knows what resounds and
-    where contacts are met, and those of the catalogue in several sizes.
+    """Starts of an effect next to a set: those of the screen, which knows resonances and places of
+    contact, and those of the catalogue in several sizes.
     """
     _, ranked = search.rank(beside)
     usual = starts_of(effect, sealed=search.trial.nominal.model["valve"] is None)

@@ -203,9 +203,7 @@ def examine(
 def _begin_part(
     fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say
 ) -> Mismatch | OnlyNoise:
-    """Some blocks examined by themselves: a mismatch with its hypotheses, or, where they keep only
-    noise, the group that they are.
-    """
+    """Examine some blocks alone: a mismatch with its hypotheses, or a group that keeps noise."""
     inner, outer = replace(fitted, blocks=blocks), replace(held, blocks=blocks)
     names = " and ".join(b.name for b in blocks)
 
@@ -238,7 +236,7 @@ def _begin_part(
 
 @dataclass(frozen=True, eq=False)
 class _Refit:
-    """Some blocks after the refit of their parameters inside their tolerances.
+    """Refit of some blocks' parameters inside their tolerances, and what each block keeps.
 
     Attributes
     ----------
@@ -272,13 +270,11 @@ class _Refit:
 
     @property
     def error_is_given(self) -> bool:
-        """Whether the size of the error is stated: by the rig file, or that there is none."""
+        """True where the size of the model's error is stated: by the rig file, or as none."""
         return _error_is_given(self.trial.nominal, self.trial.settings)
 
     def beside_less(self, candidates: list[Candidate]) -> _Refit | None:
-        """The same beside the error that the most probable hypothesis leaves to the model; None
-        where that is hardly smaller.
-        """
+        """Refit with the smaller error that the likeliest hypothesis leaves the model, or None."""
         trial, (usual, sizes) = self.trial, self.error
         each = [(c, *error_sizes(trial.inner, c.fit.residuals, usual)) for c in candidates]
         _, left, _ = max(each, key=lambda one: one[2] - _price(one[0], trial))
@@ -287,7 +283,7 @@ class _Refit:
         return self.beside({name: min(size, left[name]) for name, size in sizes.items()})
 
     def beside(self, sizes: dict[str, float]) -> _Refit | None:
-        """The same beside errors of other sizes; None where these leave no mismatch."""
+        """Refit with other sizes of the model's error; None where these leave no mismatch."""
         trial = self.trial
         own = trial.inner, trial.outer, trial.nominal, self.first, self.before
         found = _kept(*own, (self.error[0], sizes), same=trial.same)
@@ -315,7 +311,7 @@ class _Refit:
 
 
 def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refit:
-    """Fit parameters inside their tolerances, and see what each block keeps."""
+    """Fit parameters inside their tolerances, and find what each block keeps."""
     blocks, settings = inner.blocks, inner.settings
     before = residuals(inner, nominal)
     first = refitted(inner, nominal, without_autocorrelation(blocks))
@@ -330,7 +326,7 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
 
 
 def _error_is_given(nominal: Rig, settings: DiagnosisSettings) -> bool:
-    """Whether the size of the model's error is stated: by the rig file, or that there is none."""
+    """True where the size of the model's error is stated: by the rig file, or as none."""
     return bool(nominal.model_error) or not settings.usual_error
 
 
@@ -344,8 +340,8 @@ def _kept(
     *,
     same: bool,
 ) -> _Refit:
-    """The refit beside an error of the model: noise levels with that taken for usual, and how large
-    it is in each block.
+    """Refit with given sizes of the model's error: noise levels with the usual one, and its size in
+    each block as a share of that.
     """
     blocks, settings = inner.blocks, inner.settings
     noise_level = with_sizes(*error)
@@ -386,8 +382,8 @@ def _kept(
 
 
 def _price(candidate: Candidate, trial: Attempts) -> float:
-    """What the parameters of a hypothesis cost: how far they moved, and what their number could
-    have fitted by chance (Schwarz's half a logarithm of the number of bins).
+    """Log odds that the parameters of a hypothesis cost: their moves, and for each the half
+    logarithm of the number of bins (Schwarz), which it could have fitted by chance.
     """
     problem = trial.inner
     bins = sum(p.n / bins_of(p) for p in problem.recordings) * len(problem.blocks)
@@ -400,7 +396,7 @@ def _price(candidate: Candidate, trial: Attempts) -> float:
 
 
 def _healthy_group(refit: _Refit, common: Candidate) -> BlockGroup:
-    """A group whose baseline leaves noise in all recordings, once it is fitted to all of them."""
+    """Group whose baseline, fitted to all recordings, leaves only noise in them."""
     trial = refit.trial
     # what the nominal model leaves in the held-out ones is what the parameters are moved for
     quiet = residuals(trial.outer, trial.nominal)
@@ -421,8 +417,8 @@ def _acting_effects(trial: Attempts) -> list[Term]:
 
 
 def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
-    """The refit beside a smaller error, where one effect and a better model are more probable than
-    none and the model as it is; None where they are not.
+    """Refit with a smaller model error where that and an effect are more probable than the usual
+    error and none; else None.
     """
     sizes = refit.error[1]
     if refit.error_is_given or max(sizes.values()) <= LEAST_SIZE:
@@ -448,7 +444,7 @@ def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
 
 @dataclass(frozen=True, eq=False)
 class _Begun:
-    """What a mismatch is searched with.
+    """Screened mismatch, from which hypotheses are fitted.
 
     Attributes
     ----------
@@ -470,7 +466,7 @@ class _Begun:
 
 
 def _tried(refit: _Refit, tell: Say) -> Mismatch:
-    """A mismatch with every hypothesis that was tried for it, beside one size of error."""
+    """Mismatch with every hypothesis that was tried for it, at one size of the model's error."""
     work = _begun(refit, tell)
     candidates = _fit_hypotheses(work.search, work.mistaken, work.own, work.transient)
     candidates, weighed = _weigh_to_the_end(work.search, candidates)
@@ -478,7 +474,7 @@ def _tried(refit: _Refit, tell: Say) -> Mismatch:
 
 
 def _begun(refit: _Refit, tell: Say) -> _Begun:
-    """A mismatch screened, its wrong values fitted."""
+    """Screen a mismatch, and fit values that may be wrong."""
     trial, start = refit.trial, refit.start
     suspects, now = trial.suspects, start.fitted
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
@@ -512,7 +508,7 @@ def _begun(refit: _Refit, tell: Say) -> _Begun:
 
 @dataclass(frozen=True, eq=False)
 class Mismatch:
-    """What some blocks keep after the refit, with the hypotheses that were tried for it.
+    """Excess that some blocks keep after the refit, with the hypotheses tried for it.
 
     Attributes
     ----------
@@ -536,7 +532,7 @@ class Mismatch:
 
     @property
     def is_settled(self) -> bool:
-        """Whether one hypothesis is as probable as an answer that leaves no other open."""
+        """True where one hypothesis is so probable that no other is left open."""
         return max(self.weighed.values()) > self.refit.trial.settings.settled
 
     @property
@@ -552,9 +548,7 @@ class Mismatch:
         return trial.starts_of(best) if lasting else []
 
     def with_effects_of_others(self, starts: list[Start]) -> Mismatch:
-        """The same with what other blocks name tried here, where it acts: alone, and beside what
-        leads here.
-        """
+        """Try the effects that other blocks name here too, alone and with what leads here."""
         trial, start = self.refit.trial, self.candidates[0]
         self.search.tell(
             f"trying {', '.join(str(s.effect) for s in starts)}, which other blocks have"
@@ -602,7 +596,7 @@ class Mismatch:
 
 @dataclass(frozen=True, eq=False)
 class OnlyNoise:
-    """Some blocks of which the refit leaves only noise.
+    """Blocks of which the refit leaves only noise.
 
     Attributes
     ----------
@@ -616,8 +610,9 @@ class OnlyNoise:
     group: BlockGroup
 
     def with_effects_of_others(self, starts: list[Start]) -> OnlyNoise:
-        """The same with what other blocks name tried here, where it acts: it is there where
-        recordings and values are as probable with it, at the values that it has there.
+        """Group after the effects that other blocks name were tried here: one is there where
+        recordings and values are as probable with it, at the values that it has in the other
+        blocks.
         """
         trial = replace(self.refit.trial, suspects=self.group.blocks)
         baseline = self.group.candidates[0]
@@ -648,7 +643,7 @@ def _leading(weighed: Mapping[Hypothesis, float]) -> Hypothesis:
 
 
 def _is_marginal(refit: _Refit) -> bool:
-    """Whether so little is left that the noise level may as well have been estimated too low."""
+    """True where so little is left that the noise level may as well have been estimated too low."""
     found = (refit.start.fitted, refit.trial.out)
     return all(
         e.ratio - 1.0 < max(_MARGINAL_MULTIPLE * (e.limit - 1.0), _MARGINAL_EXCESS)
@@ -658,9 +653,7 @@ def _is_marginal(refit: _Refit) -> bool:
 
 
 def _best_of_each(candidates: list[Candidate]) -> list[Candidate]:
-    """Of hypotheses of the same names, in whatever order, lasting or of events, the one that leaves
-    least.
-    """
+    """Candidate of each hypothesis that leaves least."""
     best: dict[Hypothesis, Candidate] = {}
     for candidate in sorted(candidates, key=log_misfit):
         best.setdefault(candidate.hypothesis, candidate)
@@ -708,9 +701,7 @@ def _fit_events(search: Search, effects: list[Term]) -> list[Candidate]:
 def _nearly_as_heavy(
     lasting: list[Candidate], weight: Callable[[Candidate], float]
 ) -> list[Candidate]:
-    """Of lasting effects, those that leave least first, the first one and the heaviest of the
-    others, unless it weighs far less: a value that is wrong beside one may be so beside all.
-    """
+    """Best of the lasting effects, and its close runners-up by weight."""
     top = max(map(weight, lasting), default=0.0)
     near = [c for c in lasting[1:] if math.exp(weight(c) - top) > _POLISH_FROM]
     near.sort(key=weight, reverse=True)
@@ -718,7 +709,7 @@ def _nearly_as_heavy(
 
 
 def _is_visible(candidate: Candidate, start: Start) -> bool:
-    """Whether recordings depend on any parameter of an effect that was fitted."""
+    """True where recordings depend on any parameter of an effect that was fitted."""
     return any(math.isfinite(candidate.fit.std[name]) for name in start.free)
 
 
@@ -744,9 +735,7 @@ def _weigh_to_the_end(
 
 
 def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGroup:
-    """A group with a form of what is missing, where no name is likely and one is found that carries
-    over.
-    """
+    """Add a form of what is missing to a group, where no name is likely and a form carries over."""
     trial, start = refit.trial, refit.start
     # what is missing in a chamber is missing in the temperature of its gas too
     suspects = [b for b in trial.suspects if "chamber" not in b.beside] or trial.suspects
@@ -922,8 +911,8 @@ def _fit_singles(search: Search) -> list[Candidate]:
 def _fit_effect(
     trial: Attempts, start: Start, baseline: Fit, short: Candidate | None
 ) -> Candidate | None:
-    """An effect fitted from a start beside the baseline; where that leaves more than a few steps to
-    the same start had left, from where these had moved the baseline too.
+    """Fit an effect from a start with the baseline; where a few steps to the same start had left
+    less, from where these had moved the baseline too.
     """
     found = trial.fit_effects([start], baseline, trial.white)
     if short is None or (found is not None and found.misfit <= short.misfit):
@@ -934,20 +923,20 @@ def _fit_effect(
 
 
 def _is_worth(screened: Screen, scores: list[Score], least: float = LEAST_GAIN) -> bool:
-    """Whether an effect is fitted: signatures of strong effects rule none out."""
+    """True where an effect is worth a fit: of a strong mismatch each effect is."""
     return screened.strong or scores[0].gain > least
 
 
 def _scaled_starts(scores: Iterable[Score]) -> list[Start]:
-    """Where fits begin: starts in the size in which they take most."""
+    """Starts, each in the size in which it takes most."""
     return [s.start.scaled(s.size) for s in scores]
 
 
 def _shortlist(
     search: Search, worth: list[list[Term]], ranked: dict[Term, list[Score]]
 ) -> tuple[list[Term], dict[Term, list[Start]], dict[tuple[Term, str], Candidate]]:
-    """Of many effects (each a list of its places) those that leave least after a few steps, where
-    the best of these steps led, and what they came to, by effect and form.
+    """Effects, of many (each a list of its places), that leave least after a few steps; starts to
+    which the best of these steps led, and the candidates there, by effect and form.
 
     Signatures rank places and starts and rule no effect out: they are linear in what a strong
     effect is not. Each form of each effect gets a few steps from its best start at its best place;
@@ -1011,9 +1000,7 @@ def _by_family(terms: list[Term]) -> list[list[Term]]:
 
 
 def _first_of_equal_forms(fitted: list[Candidate], alike: float) -> Candidate:
-    """Of one effect's fits the one that leaves least; of forms that leave as little, the one that
-    the catalogue lists first, which is the usual one.
-    """
+    """Fit of an effect that leaves least; of forms that leave as little, the catalogue's first."""
     least = min(log_misfit(c) for c in fitted)
     near = [c for c in fitted if log_misfit(c) <= least + alike]
     (effect,) = near[0].effects
@@ -1036,14 +1023,14 @@ def _near_starts(scores: list[Score]) -> list[Score]:
 
 
 def _add_same_data(search: Search, singles: list[Candidate]) -> list[Candidate]:
-    """The singles, and beside each that may be the same data as another effect (a late clock and a
-    dead time) that other one.
+    """Single effects, and for each that may leave the same data as another effect (a late clock and
+    a dead time) that other one.
     """
     trial, start, left_by = search.trial, search.start, search.share_left
     there = {c.effects: c for c in singles}
 
     def wanted(effect: Term, own: Candidate) -> bool:
-        """Whether an effect was not fitted, or only in a form that leaves more than its equal."""
+        """True where an effect was not fitted, or only in a form that leaves clearly more."""
         fitted = there.get((effect,))
         return fits(trial.nominal, effect.id) and (
             fitted is None or left_by(fitted) > left_by(own) + FORM_SHARE_ALIKE

@@ -107,13 +107,11 @@ class Reading:
 
     @property
     def size(self) -> float:
-        """How far it is from what is said: an offset [SI], or the logarithm of the largest
-        factor.
-        """
+        """Distance from the unit said: an offset [SI], or the logarithm of the largest factor."""
         return abs(self.offset) or max(abs(math.log(factor)) for factor in self.factors)
 
     def of(self, prepared: Prepared) -> Prepared:
-        """A recording read so."""
+        """Recording with its channels read in this way."""
         maps = dict(zip(self.channels, self.factors, strict=True))
 
         def turned(values: Mapping[str, Array]) -> dict[str, Array]:
@@ -147,7 +145,7 @@ class Reading:
         )
 
     def read(self, problem: Problem) -> Problem:
-        """Recordings read so."""
+        """Problem with its recordings read in this way."""
         return replace(problem, recordings=[self.of(p) for p in problem.recordings])
 
 
@@ -187,7 +185,7 @@ def find_misread(problem: Problem, nominal: Rig) -> Reading | None:
 
 
 def _worth_a_fit(problem: Problem, nominal: Rig, readings: Sequence[Reading]) -> list[Reading]:
-    """Those that take most of what one step of the parameters leaves, where that is much."""
+    """Readings that take most of what one step of the parameters leaves, where that is much."""
     names = free_baseline(problem, nominal)
     left = _linear(problem, nominal, names)
     if left <= _SUSPECT:
@@ -254,7 +252,7 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
 
 
 def _is_noise(problem: Problem, found: Fit) -> bool:
-    """Whether a fit leaves no more than noise in any block."""
+    """True where a fit leaves no more than noise in any block."""
     levels = noise_levels(problem, core_rig(found.rig))
     own = [
         excess(b, problem.recordings, found.residuals, levels, problem.settings)
@@ -273,8 +271,8 @@ def _power(problem: Problem, found: Fit) -> float:
 
 
 def _spoils_a_block(problem: Problem, was: Fit, own: Problem, now: Fit) -> bool:
-    """Whether a reading makes what any block leaves clearly more: the right unit does not, whatever
-    physics is missing beside it.
+    """True where a reading clearly raises what any block leaves: the right unit does not, whatever
+    physics is missing as well.
     """
     blocks = [[block] for block in problem.blocks]
     before = [_power(replace(problem, blocks=one), was) for one in blocks]
@@ -283,8 +281,8 @@ def _spoils_a_block(problem: Problem, was: Fit, own: Problem, now: Fit) -> bool:
 
 
 def _linear(problem: Problem, rig: Rig, names: Sequence[str]) -> float:
-    """What the baseline leaves after one step of its parameters inside their tolerances: the mean
-    square of bin means, in variances of the noise.
+    """Mean square of bin means, in variances of the noise, that the baseline leaves after one step
+    of its parameters inside their tolerances.
     """
     known = known_parameters(rig)
     rows, slope = stacked(problem, residuals(problem, rig, names), _white(problem))
@@ -301,8 +299,8 @@ def _linear(problem: Problem, rig: Rig, names: Sequence[str]) -> float:
 
 
 def _free_is_listed(problem: Problem, found: Fit, reading: Reading) -> bool:
-    """Whether a factor (an offset) that is free would be that of the list, beside parameters that
-    move as well; the problem is that of the reading.
+    """True where a free factor (or offset), fitted with the parameters, would be that of the list;
+    the problem is that of the reading.
     """
     settings = problem.settings
     step = _FREE_STEP * (abs(reading.offset) or 1.0)
@@ -336,7 +334,7 @@ def _free_is_listed(problem: Problem, found: Fit, reading: Reading) -> bool:
 
 
 def _possible(problem: Problem, nominal: Rig) -> bool:
-    """Whether recordings read so can be of the rig at all."""
+    """True where recordings read in this way can be of the rig at all."""
     plausible = problem.settings
     return not any(implausible(p.recording, nominal, plausible) for p in problem.recordings)
 

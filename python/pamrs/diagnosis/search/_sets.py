@@ -58,7 +58,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What hypotheses for a mismatch are found with.
+    """Recordings, screen, baseline and weights with which hypotheses for a mismatch are found.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ def combine(
 
 
 def with_freed_values(search: Search, single: Candidate) -> list[Candidate]:
-    """An effect beside a file that is wrong: parameters that it moves far, freed one at a time."""
+    """Free the parameters that an effect moves far, one at a time, next to the effect."""
     found = []
     for name in far_parameters(search.trial, single.fit):
         search.tell(f"trying {single.hypothesis} with another {name}")
@@ -146,7 +146,7 @@ def with_freed_values(search: Search, single: Candidate) -> list[Candidate]:
 
 @dataclass(frozen=True, eq=False)
 class _Partner:
-    """What a set may get as its next term.
+    """Effects and wrong parameters that a set may get as its next term.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class _Partner:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """What the set gets."""
+        """Effects and wrong parameters, as terms."""
         return (*(start.effect for start in self.starts), *map(Term, self.wrong))
 
 
@@ -195,7 +195,7 @@ class _Growing:
         return self.search.trial
 
     def grow(self, sets: list[Candidate]) -> list[Candidate]:
-        """The best set with one term after the other."""
+        """Grow the best set by one term after the other."""
         weight = self.search.weight
         best = max(sets, key=weight, default=None)
         found: list[Candidate] = []
@@ -252,12 +252,12 @@ class _Growing:
         return [c for c in two_at_a_time(fitted, partners) if c is not None]
 
     def _was_tried(self, base: Candidate, terms: tuple[Term, ...]) -> bool:
-        """Whether a set was fitted with some more terms."""
+        """True where a set was fitted with some further terms."""
         return Hypothesis((*base.terms, *terms)) in self.done
 
     def _partners(self, base: Candidate, begun: list[Start]) -> Iterator[_Partner]:
-        """What may be missing beside a set: effects whose signature is in what it leaves, what
-        tells by itself, and parameters that it moves far.
+        """Partners of a set: effects whose signature is in what it leaves, terms that explain much
+        alone, and parameters that it moves far.
         """
         if far_above_noise(self.trial, base):
             alone = len(base.terms) == 1
@@ -276,7 +276,7 @@ class _Growing:
         yield from (_Partner([], (name,)) for name in strained if name not in base.wrong)
 
     def _shortlisted(self, base: Candidate, begun: list[Start]) -> list[_Partner]:
-        """The effects that leave least beside a set after a few steps, of all that act.
+        """Partners of a set: effects, of all that act, that leave least with it after a few steps.
 
         Signatures are linear in what a strong mismatch is not: they rank the starts of a form.
         """
@@ -308,7 +308,7 @@ class _Growing:
         return sorted(found, key=lambda one: self.search.weight(one[0]), reverse=True)
 
     def _begun_best(self, base: Candidate, begun: list[Start], scores: list[Score]) -> _Partner:
-        """An effect beside a set, from the start that leaves least after a few steps."""
+        """Partner of a set: an effect from the start that leaves least after a few steps."""
         starts = [s.start.scaled(s.size) for s in scores[:MOST_STARTS]]
         short = self._shortly(base, begun, starts if len(starts) > 1 else [])
         return _Partner([short[0][1] if short else starts[0]])
@@ -335,7 +335,7 @@ class _Growing:
         return [ranked[effect] for effect in best]
 
     def _telling(self, base: Candidate) -> list[_Partner]:
-        """What takes a telling share of the mismatch by itself.
+        """Partners that take a large share of the mismatch alone.
 
         The signature of a strong effect beside another one is linear in what is not; where both
         were fitted, both are known.
@@ -369,7 +369,7 @@ def _one_place_each(terms: list[Term]) -> list[Term]:
 def _event_partners(
     search: Search, singles: list[Candidate], happening: list[Term]
 ) -> list[tuple[Term, Candidate]]:
-    """Effects with times of their own, each with a persistent one that it may have happened beside.
+    """Effects with times of their own, each with a persistent one that may have acted as well.
 
     That is the persistent effect that weighs most, if it leaves much; and, of those that were
     fitted, the one whose signature is in what the events leave.
@@ -402,7 +402,7 @@ def _event_partners(
 
 
 def in_best_forms(search: Search, base: Candidate) -> Candidate:
-    """A set with each of its effects in the form that leaves least beside the others.
+    """Set with each of its effects in the form that leaves least together with the others.
 
     The form that an effect had alone is the one that did best for everything that was missing.
 
@@ -484,7 +484,7 @@ def _blocks_untouched(candidate: Candidate, start: Candidate, trial: Attempts) -
 
 
 def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bool:
-    """Whether a larger set takes a telling share of what a smaller one leaves of held-out
+    """True where a larger set takes a large share of what a smaller one leaves of held-out
     recordings, and more than the pieces of the recordings differ in it.
     """
     taken, left = [], 0.0
@@ -500,9 +500,7 @@ def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bo
 
 
 def far_above_noise(trial: Attempts, found: Candidate) -> bool:
-    """Whether what a hypothesis leaves is so far above the noise of the sensors that signatures say
-    little.
-    """
+    """True where so much more than noise is left that linear signatures say little."""
     inside = found.fitted
     if any(level.curves is not None for level in trial.noise_level.values()):
         none = dict.fromkeys((b.name for b in trial.inner.blocks), 0.0)
@@ -516,12 +514,12 @@ def far_above_noise(trial: Attempts, found: Candidate) -> bool:
 
 
 def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
-    """Whether a hypothesis leaves noise, so that no pair can be called for."""
+    """True where a hypothesis leaves only noise, so that no pair is called for."""
     return explains(candidate, start, trial.compared)
 
 
 def cannot_gain(candidate: Candidate, trial: Attempts) -> bool:
-    """Whether no further one-parameter effect could pay for itself."""
+    """True where no further one-parameter effect could pay for itself."""
     evidence = trial.settings
     least = evidence.further_price + evidence.parameter_price
     return possible_gain(candidate, trial.compared) < least

@@ -93,8 +93,8 @@ def suspected_values(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
 
 
 def _same_owner(one: str, other: str) -> bool:
-    """Whether two parameters may belong to one mistake: of blocks of one kind they have to belong
-    to the same block.
+    """True where one mistake may make two parameters wrong: of blocks of one kind they have to
+    belong to the same block.
     """
     first, second = split_name(one), split_name(other)
     return first[0] != second[0] or first[1] == second[1]
@@ -219,7 +219,7 @@ def _fit_freed(
 def _needless(
     names: tuple[str, ...], short: Mapping[tuple[str, ...], Candidate], trial: Attempts
 ) -> bool:
-    """Whether one of several parameters, freed by itself, leaves nearly as little."""
+    """True where one of several parameters, freed alone, leaves nearly as little."""
     alone = [short[name,].misfit for name in names if (name,) in short] if len(names) > 1 else []
     return any((1.0 - FURTHER_SHARE) * own < short[names].misfit for own in alone)
 
@@ -275,8 +275,8 @@ def _predicted_gain(
 
 
 def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], None]) -> BlockGroup:
-    """A group whose baseline leaves only noise, but moves parameters for it: which one the file is
-    wrong about.
+    """Find the value that the file is wrong about, in a group whose baseline leaves only noise, but
+    moves parameters for it.
 
     Each that promises it is freed. What speaks for it is how much more probable it makes recordings
     and values, weighed against the odds of a file that is so wrong.
@@ -316,6 +316,6 @@ def _plausibility(candidate: Candidate) -> float:
 
 
 def _carries_over(candidate: Candidate, start: Candidate) -> bool:
-    """Whether held-out recordings are predicted as well as by the baseline, or to their noise."""
+    """True where held-out recordings are predicted as well as by the baseline, or to noise."""
     pairs = [(candidate.held_out[name], was) for name, was in start.held_out.items()]
     return all(now.ratio <= max(now.limit, was.ratio) for now, was in pairs)
