@@ -1,4 +1,4 @@
-"""What a diagnosis found, as types: what `pamrs.diagnosis` fills, and `pamrs.report` shows.
+"""Types for what a diagnosis found: `pamrs.diagnosis` fills them, and `pamrs.report` shows them.
 
 Entries have attributes and can be read like dictionaries. This package lies below reports and
 diagnosis, so that neither has to know the other to name what lies between them. It decides one

@@ -36,7 +36,7 @@ _WHY: Final = ("", "missed", "sets", "probability", "units")
 
 
 def beyond(size: float, noise: float, error: float) -> float:
-    """What an error has beyond noise and the error of the model.
+    """Part of an error beyond noise and the error of the model.
 
     Parameters
     ----------
@@ -123,12 +123,12 @@ class Part:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """What leads: names, or ``none``, ``parameters``, ``unlisted``."""
+        """Leading answer: names, or ``none``, ``parameters``, ``unlisted``."""
         return self.left[0][0]
 
     @property
     def probability(self) -> float:
-        """Of what leads."""
+        """Probability of the leading answer."""
         return self.left[0][1]
 
     @property
@@ -144,7 +144,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Answer(Entry):
-    """The answer of a result.
+    """Answer of a result: what leads, where, with which probability, and if that is settled.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ class Answer(Entry):
         return [name for part in self.parts for name in part.names]
 
     def part_of(self, block: str | None) -> Part | None:
-        """What is answered about the group with a block."""
+        """Answer about the group of blocks that has this one; None without such a group."""
         every = (*self.parts, *self.quiet)
         return next((part for part in every if block in part.group.blocks), None)
 
@@ -213,7 +213,7 @@ def answer_of(
     form: bool = False,
     other_law: bool = False,
 ) -> Answer:
-    """The answer that findings come to.
+    """Decide the answer that findings come to.
 
     Parameters
     ----------
@@ -290,7 +290,7 @@ def _block(group: BlockVerdict, places: Mapping[str, str | None]) -> str | None:
 
 
 def _refit_noises(part: Part, errors: Mapping[str, ChannelError]) -> float:
-    """What the refitted model misses in the block of a part [noise levels]."""
+    """Error of the refitted model in the block of a part [noise levels]."""
     own = next((m for m in part.group.mismatch if m.block == part.block), None)
     if own is None:
         return 0.0
@@ -341,7 +341,7 @@ def _model(parts: Sequence[Part], *, changed: bool) -> str:
 def left_of(
     mismatch: BlockMismatch, error: ChannelError | None, stage: str, *, healthy: bool = False
 ) -> str:
-    """What is left of a block's channel at a stage.
+    """Kind of what is left of a block's channel at a stage: noise, error of the model, or more.
 
     Parameters
     ----------

@@ -58,7 +58,7 @@ class Compared:
     changed: list[str] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
-        """The same as JSON has it."""
+        """Return the comparison as JSON has it."""
         return {key: to_plain(value) for key, value in vars(self).items()}
 
 
@@ -137,7 +137,7 @@ def _free_run(result: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _changed(found: Compared, first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
-    """What changed, in words."""
+    """Sentences on what changed from one result to the other."""
     told = []
     for what, (one, other) in (("verdict", found.verdict), ("block", found.block)):
         if one != other:
@@ -169,13 +169,13 @@ def _changed(found: Compared, first: Mapping[str, Any], second: Mapping[str, Any
 
 
 def _differ(what: str, one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
-    """Which entries of two tables differ."""
+    """Sentence with the entries in which two tables differ."""
     names = sorted(name for name in {*one, *other} if one.get(name) != other.get(name))
     return f"{what} differ: {', '.join(names)}"
 
 
 def _term(effect: Mapping[str, Any]) -> str:
-    """What hypotheses call an effect: its id, with the block at which it acts."""
+    """Name of an effect in hypotheses: its id, with the block at which it acts."""
     return f"{effect['id']}@{effect['at']}" if effect.get("at") else str(effect["id"])
 
 

@@ -1,6 +1,4 @@
-"""What stands beside the answer: the next experiment, residuals, conditions, everything that was
-tried.
-"""
+"""Entries of a result next to the answer: next experiment, residuals, everything that was tried."""
 
 from __future__ import annotations
 
@@ -132,7 +130,7 @@ class Curves(Entry):
 
 @dataclass(frozen=True, eq=False)
 class PairExperiment(Entry):
-    """What tells two hypotheses that are both left open from each other.
+    """Experiment or measurement that separates two hypotheses that are both left open.
 
     Attributes
     ----------
@@ -188,7 +186,7 @@ class Protocol(Entry):
 
 @dataclass(frozen=True, eq=False)
 class Form(Entry):
-    """What a mismatch without a name in one block is a function of.
+    """Function that a mismatch without a name follows in one block.
 
     Attributes
     ----------
@@ -221,7 +219,7 @@ class Form(Entry):
 
 @dataclass(frozen=True, eq=False)
 class NextExperiment(Entry):
-    """What to record next.
+    """Experiment to record next, and its reason.
 
     Attributes
     ----------
@@ -316,7 +314,7 @@ class Tried(Entry):
 
 @dataclass(frozen=True, eq=False)
 class RecordingUsed(Entry):
-    """What of a recording the answer rests on.
+    """Samples and channels of a recording that the answer rests on.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ class Condition(Entry):
 
 @dataclass(frozen=True, eq=False)
 class Where(Entry):
-    """Where the mismatch is.
+    """Place and times of the mismatch.
 
     Attributes
     ----------
@@ -127,13 +127,13 @@ class EffectFound(Entry):
 
     @property
     def term(self) -> str:
-        """What hypotheses call it: its id, and behind an ``@`` the block at which it acts."""
+        """Name in hypotheses: its id, and behind an ``@`` the block at which it acts."""
         return f"{self.id}@{self.at}" if self.at else self.id
 
 
 @dataclass(frozen=True, eq=False)
 class MismatchSize(Entry):
-    """What is more than noise.
+    """Size of a residual beyond the noise.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class MismatchSize(Entry):
 
 @dataclass(frozen=True, eq=False)
 class MismatchStages(Entry):
-    """What is more than noise, before and after.
+    """Sizes of a residual beyond the noise, before and after.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class MismatchStages(Entry):
 
 @dataclass(frozen=True, eq=False)
 class BlockMismatch(Entry):
-    """What one block misses.
+    """Mismatch of one block, on fitted and on held-out recordings.
 
     Attributes
     ----------
@@ -333,7 +333,7 @@ class StageError(Entry):
 
 @dataclass(frozen=True, eq=False)
 class ChannelError(Entry):
-    """Root mean square error of a channel beside its noise, SI.
+    """Root mean square error of a channel, and its noise, SI.
 
     Attributes
     ----------
@@ -494,13 +494,13 @@ class ParameterFound(Entry):
 
     @property
     def known(self) -> bool:
-        """Whether the recordings determine how far it moved."""
+        """True where the recordings determine how far it moved."""
         return self.identifiable is not False and math.isfinite(self.moved_sigmas)
 
 
 @dataclass(frozen=True, eq=False)
 class FitErrors(Entry):
-    """How well the models predict each channel.
+    """Errors of the models by channel, and the share of the gap to the noise that is closed.
 
     Attributes
     ----------
@@ -518,7 +518,7 @@ class FitErrors(Entry):
 
 @dataclass(frozen=True, eq=False)
 class FreeRunError(Entry):
-    """Root mean square error of a channel in a free run, beside that of the cut chain.
+    """Root mean square error of a channel in a free run, and in the cut chain.
 
     Attributes
     ----------

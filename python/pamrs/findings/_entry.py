@@ -1,4 +1,4 @@
-"""What an entry of a result is: a frozen dataclass that can be read like a dictionary."""
+"""Base class of the entries of a result, and their conversion to and from plain values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a diagnosis found, as a whole, with its curves and the model that it read."""
+"""All findings of a diagnosis, with its curves and the model that it read."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a diagnosis found, as plain data; `pamrs.Diagnosis` adds what can be done with it.
+    """Findings of a diagnosis, as plain data; `pamrs.Diagnosis` adds what can be done with them.
 
     Attributes
     ----------
@@ -248,7 +248,7 @@ class Findings:
 
     @cached_property
     def answer(self) -> Answer:
-        """What all of this comes to, decided once: texts, tables and pictures take it from here."""
+        """Answer to all of this, decided once: texts, tables and pictures take it from here."""
         if self.misread:
             return Answer("units", False, "units", None, [], math.nan, [], REFITTED, [], [])
         block = self.where.block

@@ -64,7 +64,7 @@ class MissingRecording(Entry):
         return self.time if argument == "time" else self.arguments[argument]
 
     def each(self, change: Callable[[Array], Array]) -> MissingRecording:
-        """The same with each of its curves changed: some of their points, or fewer digits."""
+        """Copy with each of its curves changed: some of their points, or fewer digits."""
         return replace(
             self,
             time=change(self.time),
@@ -190,8 +190,8 @@ def shown_unit(unit: str) -> tuple[str, float]:
 
 
 def _draw(found: MissingInput, axes: Any) -> None:
-    """The input with its band over what it depends on, up and down strokes apart; over time where
-    no argument tells it, of the recording that has most.
+    """Draw the input with its band over its argument, up and down strokes apart; without an
+    argument over time, of the recording that has most of it.
     """
     argument, told = found.argument or "time", found.recordings
     if argument == "time":
