@@ -126,7 +126,7 @@ def chain_svg(diagnosis: Findings) -> str | None:
 
 
 def draw_chain(axes: Axes, diagnosis: Findings) -> None:
-    """The same on matplotlib's axes; nothing where the diagnosis has no rig.
+    """Draw the rig as a chain of blocks on matplotlib's axes; nothing where there is no rig.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def _marked(rig: Rig, diagnosis: Findings) -> dict[str, _Part]:
 
 
 def _title(rig: Rig, kind: str, name: str) -> str:
-    """What a block is called in the drawing."""
+    """Title of a block in the drawing."""
     table = rig.tables(kind)[name]
     own = {
         "supply": {"tank": "tank", "regulator": "regulator"}.get(str(table.get("kind")), "supply"),
@@ -252,7 +252,7 @@ def _middle(rows: list[float], otherwise: float) -> float:
 
 
 def _mark(parts: dict[str, _Part], diagnosis: Findings) -> None:
-    """What was found, at the blocks that it acts in."""
+    """Mark the blocks in which something was found, with what was found."""
     answer = diagnosis.answer
     open_ = {n for p in answer.parts for n in p.names if not p.sure or answer.missed}
     for effect in (e for e in diagnosis.effects if e.term in answer.named):
@@ -396,7 +396,7 @@ class _Drawing:
     def _arrow(
         self, first: tuple[float, float], second: tuple[float, float]
     ) -> tuple[float, float, float, float]:
-        """From one box to the next, at the height of their titles: begin and end."""
+        """Begin and end of an arrow from one box to the next, at the height of their titles."""
         (x, y), (to, end) = first, second
         start, stop = (x + BOX, to - 2.0) if to > x else (x, to + BOX + 2.0)
         return start, y + 24.0, stop, end + 24.0

@@ -27,7 +27,7 @@ def _value(own: dict[str, Any] | None) -> str:
 
 
 def tables(found: Compared) -> list[tuple[str, list[tuple[str, str, str]]]]:
-    """What two results have side by side: titles, and rows of a name and both entries.
+    """Tables of two results: titles, and rows of a name and both entries.
 
     Parameters
     ----------

@@ -109,7 +109,7 @@ def _largest(*curves: Array | None) -> float:
 
 
 def _has(values: Array | None, besides: Array | None = None) -> bool:
-    """Whether a curve has data and differs from another one."""
+    """True where a curve has data and differs from another one."""
     if values is None or not np.any(np.isfinite(values)):
         return False
     return besides is None or not np.allclose(values, besides, equal_nan=True)
@@ -186,7 +186,7 @@ def _line(name: str, stage: str, time: Array, values: Array, **how: Any) -> Line
 
 
 def _compared(trace: Trace, factor: float) -> list[Line]:
-    """What was measured, and what the model of the rig file gives."""
+    """Curves of the measurement, and of the model of the rig file."""
     measured = _line("measured", "measured", trace.time, trace.measured * factor, width=2.6)
     return [measured, _line("your model", "before", trace.time, trace.before * factor)]
 
@@ -288,7 +288,7 @@ def draw_panels(part: Any, panels: Sequence[Panel], scale: float = 1.0) -> None:
 
 
 def curves(panels: Sequence[Panel], prefix: str) -> str:
-    """Panels as a drawing that stands by itself, and the same as data that a script redraws.
+    """Panels as a drawing, and as data from which a script draws them again.
 
     Parameters
     ----------
@@ -434,7 +434,7 @@ def separating_panels(own: Curves) -> list[Panel]:
 
 
 def free_head(diagnosis: Findings) -> str:
-    """What the first curves show, in a few words."""
+    """Heading of the first curves, in a few words."""
     if diagnosis.free_traces:
         told = diagnosis.free_traces[0]
         return f"Recording {told.recording}, the whole rig from its commands alone"

@@ -95,7 +95,7 @@ def _verdict(diagnosis: Findings, block: BlockVerdict) -> tuple[str, str, str]:
 
 
 def _missed(diagnosis: Findings, block: BlockMismatch) -> list[str]:
-    """What a block misses, refitted and with what was found."""
+    """Errors of a block, refitted and with what was found, in words."""
     told = []
     for stage in ("refit", "after"):
         missed = words.miss(diagnosis, block.channel, stage)
@@ -119,7 +119,7 @@ def _share(share: float | None) -> str:
 
 
 def _intervals(diagnosis: Findings) -> list[str]:
-    """Where in time the excess is, in words."""
+    """Words on the times at which the excess is."""
     spans = [(float(a), float(b)) for a, b in diagnosis.where.intervals]
     told = next((t for t in diagnosis.traces if t.recording == diagnosis.where.recording), None)
     if told is not None and sum(b - a for a, b in spans) > THROUGHOUT * float(
@@ -190,7 +190,7 @@ def _fits(diagnosis: Findings) -> list[tuple[str, list[Any], str]]:
 
 
 def _free_run(diagnosis: Findings) -> list[tuple[str, str, str, list[str]]]:
-    """Errors of free runs beside those of the cut chain, channel by channel."""
+    """Errors of free runs and of the cut chain, channel by channel."""
     rows, yours = [], diagnosis.answer.model == YOURS
     for run in diagnosis.free_run or []:
         for k, (channel, error) in enumerate(run.channels.items()):
@@ -210,9 +210,7 @@ _LEFT = {
 
 
 def _budget(diagnosis: Findings) -> list[tuple[str, list[dict[str, str]]]]:
-    """The terms of each block's budget as bars from nothing, each with its interval where the text
-    beside it says.
-    """
+    """Bars of the terms of each block's budget, each with its interval where the text has it."""
     blocks = {name: words.told_terms(own) for name, own in words.budgets(diagnosis).items()}
     every = [v for own in blocks.values() for _, t in own for v in (t.share, *t.interval)]
     low, high = max(-1.0, min([0.0, *every])), min(2.5, max([1.0, *every]))
@@ -242,7 +240,7 @@ def _budget(diagnosis: Findings) -> list[tuple[str, list[dict[str, str]]]]:
 
 
 def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
-    """What was found, as cells: name, in the rig file, on the bench, value and interval, unit."""
+    """Rows of what was found: name, in the rig file, on the bench, value and interval, unit."""
     rows: list[tuple[str, ...]] = []
     for effect in diagnosis.effects:
         bench, vague = dict(story.bench_value(effect)), words.undetermined(effect)
@@ -270,7 +268,7 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
 
 
 def _limits(diagnosis: Findings) -> list[tuple[str, ...]]:
-    """From which sizes on the recordings would have shown effects, and told them apart."""
+    """Rows of sizes from which the recordings would have shown effects, and told them apart."""
     return [
         (
             words.label(own.effect),

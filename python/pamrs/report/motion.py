@@ -1,4 +1,4 @@
-"""A simulation to look at: its channels over time, and the arm or the mass as it moves."""
+"""Pictures of a simulation: its channels over time, and the arm or the mass as it moves."""
 
 from __future__ import annotations
 
@@ -168,9 +168,7 @@ def _of(result: Simulation, heads: tuple[str, ...]) -> list[str]:
 
 
 def _recorded(name: str, given: Mapping[str, Any]) -> str:
-    """Name of the recorded channel that belongs beside a simulated one, empty where there is
-    none.
-    """
+    """Name of the recorded channel that belongs to a simulated one; empty where there is none."""
     other = recorded_as(name)
     return other if other in given else ""
 
@@ -181,7 +179,7 @@ def _label(name: str, several: bool) -> str:
 
 
 def _tells(result: Simulation, name: str) -> bool:
-    """Whether a simulated channel moves at all."""
+    """True where a simulated channel moves at all."""
     return float(np.ptp(result[name])) > 1e-9 * max(float(np.abs(result[name]).max()), 1e-12)
 
 
@@ -255,9 +253,7 @@ class _Muscles:
         self.line: Any = axes.plot([], [], solid_capstyle="round", alpha=0.85)[0]
 
     def draw(self, row: int, base: Array, along: Array, side: float) -> Array:
-        """From a distance beyond a joint towards it, on one side of the link that carries them; the
-        end that moves.
-        """
+        """Draw the muscles from beyond a joint to it, on one side of the link; return their end."""
         beside = side * 1.2 * float(self.widths.max()) * np.array([along[1], -along[0]])
         far = base + 1.1 * self.rest * along + beside
         near = far - self.rest * (1.0 - float(self.contraction[row])) * along

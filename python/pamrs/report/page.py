@@ -1,4 +1,4 @@
-"""What every report page shares: the style sheet and the settings of the templates."""
+"""Style sheet and settings of the templates, which every report page shares."""
 
 from __future__ import annotations
 

@@ -74,8 +74,8 @@ def one_page_pdf(diagnosis: Findings) -> bytes:
 
 
 def _draw_first(part: Any, diagnosis: Findings, most: int) -> None:
-    """The free run, with one legend for all of its panels; the missing input, where there is one,
-    in the place of the last of them.
+    """Draw the free run, with one legend for all of its panels, and the missing input, where there
+    is one, instead of the last of them.
     """
     missing = diagnosis.missing_input
     if missing is not None:

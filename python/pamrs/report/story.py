@@ -23,8 +23,8 @@ AS_MUCH = 0.03
 
 
 class Rival(NamedTuple):
-    """One explanation: its name, probability in words and as a number, whether it is the answer,
-    and why it stands where it does.
+    """Explanation in a ranking: its name, probability in words and as a number, whether it is the
+    answer, and the reason for its place.
     """
 
     name: str
@@ -94,8 +94,9 @@ def headline(diagnosis: Findings) -> str:
 
 
 def _together(parts: Sequence[Part], *, doubt: bool) -> str:
-    """What several groups name, each with its place and how sure it is, where none leaves anything
-    open: ``The model leaves out pressure lag in the arm (0.95) and in the chamber (0.93)``.
+    """Sentence on names of several groups, each with its place and probability, where none leaves
+    anything open: ``The model leaves out pressure lag in the arm (0.95) and in the chamber
+    (0.93)``.
     """
     if len(parts) < 2 or any(p.group.wrong_parameters or not p.sure for p in parts):
         return ""
@@ -125,7 +126,7 @@ def _healthy(diagnosis: Findings) -> str:
 
 
 def _listed(names: Sequence[str], most: int, last: str) -> str:
-    """Some of several names: ``a, b or 3 more``."""
+    """Some of several names in a row: ``a, b or 3 more``."""
     told = list(names[:most])
     if len(names) > most:
         told.append(f"{len(names) - most} more")
@@ -133,7 +134,7 @@ def _listed(names: Sequence[str], most: int, last: str) -> str:
 
 
 def _phrase(diagnosis: Findings, part: Part, most: int) -> str:
-    """What the answers of a group that are left share, and at most so many of their names."""
+    """Words on what the answers left of a group share, and at most so many of their names."""
     left = [Hypothesis.of(own) for own, _ in part.left]
     doubt = bool(diagnosis.answer.missed) or not part.sure
     values = [term.is_value for h in left for term in h.terms]
@@ -165,7 +166,7 @@ def _with_chance(text: str, chance: Part | float) -> str:
 
 
 def _head(place: str, left: Sequence[Hypothesis], *, doubt: bool) -> str:
-    """What the answers of a group that are left share, in words."""
+    """Words on what the answers that are left of a group share."""
     if left[0] == NONE:
         return f"The model of the {place} may be complete; not ruled out"
     if left[0] == PARAMETERS:
@@ -186,8 +187,8 @@ def _head(place: str, left: Sequence[Hypothesis], *, doubt: bool) -> str:
 
 
 def facts(diagnosis: Findings) -> list[tuple[str, str]]:
-    """What the first screen says in numbers: the block with its own probability, the name with its,
-    the size on the bench, and what the model misses with what was found.
+    """Numbers of the first screen: the block with its own probability, the name with its, the size
+    on the bench, and what the model misses with what was found.
     """
     if diagnosis.misread:
         return [
@@ -265,7 +266,7 @@ def _on_bench(effect: EffectFound, name: str, own: EffectParameterFound) -> str:
 
 
 def to_do(diagnosis: Findings) -> list[str]:
-    """What to do on the bench about each answer that is left."""
+    """Sentences on what to do on the bench about each answer that is left."""
     found = []
     for part in diagnosis.answer.parts[:2]:
         for term in dict.fromkeys(t for own, _ in part.left for t in Hypothesis.of(own).terms):
@@ -287,8 +288,8 @@ def next_to_do(diagnosis: Findings) -> str:
 
 
 def rivals(diagnosis: Findings) -> list[Rival]:
-    """The explanations of each mismatch in the order of the title, the most probable first, and why
-    each stands there; behind those of the located one the effects that come closest by themselves.
+    """Explanations of each mismatch in the order of the title, the most probable first, with the
+    reason for each; after those of the located one the effects that come closest alone.
     """
     shown = words.bars(diagnosis)
     found = []
@@ -306,7 +307,7 @@ def rivals(diagnosis: Findings) -> list[Rival]:
 def _ranked(
     diagnosis: Findings, part: Part | None, chances: Mapping[str, float], most: int
 ) -> list[Rival]:
-    """At most so many explanations of what one group of blocks misses."""
+    """Explanations of what one group of blocks misses, at most so many."""
     ranked = words.ranked_probabilities(chances, None)
     shown = [(key, p) for key, p in ranked if p >= 0.005]
     shown += [(key, p) for key, p in ranked if p < 0.005 and key in ("none", "parameters")]
@@ -350,7 +351,7 @@ def _taken(diagnosis: Findings, names: Iterable[str]) -> float | None:
 
 
 def _why(diagnosis: Findings, part: Part | None, key: str) -> str:
-    """Why an explanation has the probability that it has."""
+    """Reason why an explanation has its probability."""
     hypothesis = Hypothesis.parse(key)
     if hypothesis == UNLISTED:
         return "a cause without a name is never ruled out"

@@ -110,7 +110,7 @@ def _free_run(diagnosis: Findings) -> list[str]:
 
 
 def _budget(diagnosis: Findings) -> list[str]:
-    """What takes the mismatch of each block."""
+    """Lines on what takes the mismatch of each block."""
     lines = []
     for block, sentence in words.budget_sentences(diagnosis):
         told = f"Budget of the {words.spoken_name(block)}: {sentence}".translate(_ASCII)
@@ -124,7 +124,7 @@ def _budget(diagnosis: Findings) -> list[str]:
 
 
 def _next(diagnosis: Findings) -> list[str]:
-    """What to record next, and what tells the leading hypothesis from each other one."""
+    """Lines on what to record next, and on what separates the leading hypothesis from others."""
     own = diagnosis.next_experiment
     if not own.text:
         return []

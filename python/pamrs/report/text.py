@@ -100,7 +100,7 @@ def hypothesis_label(key: str) -> str:
 
 
 def answer_label(names: Sequence[str]) -> str:
-    """Readable name of what leads a group: none and parameters are one answer."""
+    """Readable name of the answer that leads a group: none and parameters are one answer."""
     return "no physics is missing" if names[:1] and names[0] in HEALTHY else set_label([*names])
 
 
@@ -110,7 +110,7 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 
 
 def is_number(value: Any) -> TypeGuard[float]:
-    """Whether `value` is a finite real number (NaN, infinities, None and text are not)."""
+    """True where `value` is a finite real number (NaN, infinities, None and text are not)."""
     try:
         return value is not None and math.isfinite(float(value))
     except (TypeError, ValueError):
@@ -306,13 +306,13 @@ def blocks_label(block: BlockVerdict) -> str:
 
 
 def is_named(part: Part | None, hypothesis: str) -> bool:
-    """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that leads a group."""
+    """True where `hypothesis` (an id, or ids joined by ``+``) is the one that leads a group."""
     return part is not None and set(hypothesis.split("+")) == set(part.words)
 
 
 def sentence_of(wrong: WrongParameter) -> str:
-    """What the rig file says of a parameter and what the recordings say:
-    ``chamber dead volume is 360 +- 5 cm3, not 150 +- 23``.
+    """Sentence on a wrong value of the rig file: ``chamber dead volume is 360 +- 5 cm3, not 150 +-
+    23``.
     """
     unit, factor = display_unit(wrong.unit, abs(wrong.nominal))
     keys = ("value", "std", "nominal", "tolerance")
@@ -324,8 +324,8 @@ def sentence_of(wrong: WrongParameter) -> str:
 
 
 def considered_sentence(own: Considered) -> str:
-    """What a set that was asked for leaves: ``base flexibility: probability 92 %; it
-    leaves 0.1 % of the mismatch of the arm``.
+    """Sentence on a set that was asked for: ``base flexibility: probability 92 %; it leaves 0.1 %
+    of the mismatch of the arm``.
     """
     names = set_label(own.names)
     if not own.blocks:
@@ -344,8 +344,8 @@ def considered_sentence(own: Considered) -> str:
 
 
 def kept_sentence(kept: Unexplained) -> str:
-    """What is left in a block: ``the residual of the arm is 15 times the noise level (0.4 deg) on
-    held-out recordings, and no name explains it``.
+    """Sentence on what is left in a block: ``the residual of the arm is 15 times the noise level
+    (0.4 deg) on held-out recordings, and no name explains it``.
     """
     why = "what is named does not explain it"
     if kept.verdict == "unlisted":
@@ -359,7 +359,9 @@ def kept_sentence(kept: Unexplained) -> str:
 
 
 def kept_details(kept: Unexplained) -> str:
-    """The same with its share of the budget and the conditions under which it is largest."""
+    """Sentence on what is left in a block, with its share of the budget and the conditions under
+    which it is largest.
+    """
     text = kept_sentence(kept)
     if is_number(kept.share) and kept.interval is not None and _tellable(kept.share):
         text += (
@@ -410,8 +412,8 @@ def spoken_block(name: str) -> str:
 
 
 def told_pairs(diagnosis: Findings) -> list[tuple[PairExperiment, str]]:
-    """What tells each two hypotheses that are left open apart; an instruction that was given before
-    is not given again.
+    """Texts on what separates each two hypotheses that are left open; an instruction that was given
+    before is not given again.
     """
     own = diagnosis.next_experiment
     before = {own.text: "The same experiment."}
@@ -445,7 +447,7 @@ def _shared(one: str, other: str) -> int:
 
 
 def searched(part: Part) -> bool:
-    """Whether anything with a name was tried for what a group of blocks misses."""
+    """True where anything with a name was tried for what a group of blocks misses."""
     return any(key not in (*HEALTHY, "unlisted") for key in part.group.probabilities)
 
 
@@ -459,8 +461,7 @@ def law_sentence(law: OtherLaw) -> str:
 
 
 def missed_sentence(diagnosis: Findings, most: int | None = None) -> str:
-    """What the final model still misses, in words; empty where that is no more than noise and its
-    error explain.
+    """Sentence on what the final model still misses; empty where noise and its error explain that.
 
     Parameters
     ----------
@@ -514,8 +515,9 @@ def worse_sentence(errors: Mapping[str, ChannelError]) -> str:
 
 
 def within_error(diagnosis: Findings) -> list[str]:
-    """Groups of which nothing is missing, beside others, that miss much, inside the error of their
-    model: ``the arm fits to within its usual error (joint angle 1.2 deg of 1.9 deg)``.
+    """Groups of which nothing is missing, though they miss much, inside the error of their model,
+    where other groups lack something: ``the arm fits to within its usual error (joint angle 1.2 deg
+    of 1.9 deg)``.
     """
     told = []
     for part in diagnosis.answer.quiet if diagnosis.answer.parts else ():
@@ -586,7 +588,7 @@ class Miss(NamedTuple):
 
 
 def miss(diagnosis: Findings, channel: str | None, stage: str) -> Miss | None:
-    """What a block misses of its channel: the one size of a mismatch that text and page tell.
+    """Error of a block's channel: the one size of a mismatch that text and page report.
 
     Parameters
     ----------
@@ -615,7 +617,7 @@ def worst_channel(diagnosis: Findings) -> str | None:
 
 
 def miss_of(error: ChannelError, channel: str, stage: str) -> Miss | None:
-    """The same of an entry of the table of errors."""
+    """Error of a channel by its entry in the table of errors; None where that is not known."""
     value = error[stage]
     if not is_number(value) or not is_number(error.noise) or not error.noise > 0.0:
         return None
@@ -630,8 +632,7 @@ def sized(value: float, unit: str) -> str:
 
 
 def mended_sentence(diagnosis: Findings, by: str) -> str:
-    """What the channels of the blocks with a name, or with a form of what has none, are missed by,
-    before and after.
+    """Sentence on the errors, before and after, of blocks with a name or with a form without one.
 
     Parameters
     ----------
@@ -656,7 +657,7 @@ def mended_sentence(diagnosis: Findings, by: str) -> str:
 
 
 def unsettled_sentence(diagnosis: Findings) -> str:
-    """Why an answer is not settled; empty where it is."""
+    """Sentence on why an answer is not settled; empty where it is."""
     answer = diagnosis.answer
     open_ = [part for part in answer.parts if len(part.left) > 1]
     several = len(answer.parts) > 1
@@ -687,7 +688,7 @@ def told_apart(part: Part) -> str:
 
 
 def _spread(name: str, others: Collection[str]) -> str:
-    """An effect that acts everywhere, with that said where it stands beside itself at one block."""
+    """Effect that acts everywhere, with words for that where it is also named at one block."""
     at_one = (term for other in others if (term := Term.parse(other)).at)
     apart = name in EFFECTS and any(term.id == name for term in at_one)
     return str(Term(name, EFFECTS[name].everywhere)) if apart else name
@@ -709,8 +710,8 @@ DOWN_TO_NOISE = "down to the noise level"
 
 
 def down_to(diagnosis: Findings) -> str:
-    """How closely a model without anything missing explains the recordings: ``down to the noise
-    level``, or to within the error that is taken for its own where it misses more than noise.
+    """Words on how closely a model without anything missing explains the recordings: ``down to the
+    noise level``, or to within the error that is taken for its own where it misses more than noise.
     """
     missed = [
         (found.noises, own, left, found)
@@ -729,8 +730,8 @@ def down_to(diagnosis: Findings) -> str:
 
 
 def left_in(diagnosis: Findings, block: str, stage: str = "after") -> str:
-    """What is left in a block with the final model, as :func:`pamrs.findings.left_of` has it; empty
-    where a result does not say.
+    """Kind of what is left in a block with the final model, as :func:`pamrs.findings.left_of` has
+    it; empty where a result does not say.
     """
     own = next((m for b in diagnosis.judged for m in b.mismatch if m.block == block), None)
     if own is None:
@@ -740,7 +741,7 @@ def left_in(diagnosis: Findings, block: str, stage: str = "after") -> str:
 
 
 def judged_place(diagnosis: Findings) -> str:
-    """Where nothing is missing: in the blocks that were judged, where not all of them were."""
+    """Words on the judged blocks, in which nothing is missing; empty where all were judged."""
     if not diagnosis.not_judged:
         return ""
     return f" in the {' and '.join(blocks_label(block) for block in diagnosis.judged)}"
@@ -789,7 +790,7 @@ def effect_title(effect: EffectFound) -> str:
 
 
 def effect_heading(diagnosis: Findings, effect: EffectFound) -> str:
-    """The same, and that it only comes closest where it is not named."""
+    """Name and form of an effect, marked where it only comes closest and is not named."""
     title = effect_title(effect)
     named = effect.term in diagnosis.answer.named
     return title if named else f"not named, but closest: {title}"
@@ -814,7 +815,7 @@ def budget_sentences(diagnosis: Findings) -> list[tuple[str, str]]:
 
 
 def budget_sentence(terms: Sequence[BudgetTerm], left: str = "") -> str:
-    """The budget of one block in words; what is left is told as what it is, where that is known
+    """Sentence on the budget of one block; its rest is called what it is, where that is known
     (``noise``, ``error``, ``more``).
     """
     *before, (_, last) = told_terms(terms)
@@ -831,8 +832,8 @@ def budget_sentence(terms: Sequence[BudgetTerm], left: str = "") -> str:
 
 
 def told_terms(terms: Sequence[BudgetTerm]) -> list[tuple[str, BudgetTerm]]:
-    """The terms of a block's budget that are told, each with its name: as they are; together, where
-    one takes back what another one spoils, so that shares of single ones say nothing.
+    """Terms of a block's budget that are reported, each with its name: as they are, or together
+    where one takes back what another one spoils, so that shares of single ones say nothing.
     """
     *before, last = terms
     if all(_tellable(term.share) for term in before):
@@ -849,7 +850,7 @@ def told_terms(terms: Sequence[BudgetTerm]) -> list[tuple[str, BudgetTerm]]:
 
 
 def _tellable(share: float) -> bool:
-    """Whether a share says something by itself."""
+    """True where a share says something by itself."""
     return -TELLING <= share <= 1.0 + TELLING
 
 
@@ -879,7 +880,7 @@ _TOLD_LOGS = 3
 
 
 def left_out_sentence(diagnosis: Findings) -> str:
-    """What of the recordings was left out, mended or masked, with its counts.
+    """Sentence on what of the recordings was left out, mended or masked, with its counts.
 
     Parameters
     ----------

@@ -116,13 +116,13 @@ def _effects(diagnosis: Findings, case: Case) -> str:
 
 
 def _closed(diagnosis: Findings, by: str) -> str:
-    """What the model misses then; empty where that is not known."""
+    """Sentence on what the model misses then; empty where that is not known."""
     told = mended_sentence(diagnosis, by)
     return f" {told}, on {diagnosis.proof}." if told else ""
 
 
 def _mistaken(diagnosis: Findings) -> str:
-    """Which values of the rig file are wrong, and what that does to the error."""
+    """Sentences on the values of the rig file that are wrong, and what that does to the error."""
     found = diagnosis.wrong_parameters
     if not found:
         return ""
@@ -155,7 +155,7 @@ def _instead(value: float, before: float, unit: str) -> str:
 
 
 def _without_name(diagnosis: Findings, without: Sequence[Part]) -> str:
-    """What stays without a name, and where."""
+    """Sentences on what stays without a name, and where."""
     answer = diagnosis.answer
     if answer.named:
         kept = [u for u in diagnosis.unexplained if u.verdict == "unlisted"]
