@@ -52,29 +52,22 @@ def messages(path):
     writes. Docstrings and strings that document a name are none, but those of commands are.
     """
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    aside = {
-        id(node.value)
+    parts = {
+        id(part)
         for node in ast.walk(tree)
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-    }
-    pieces = {
-        id(piece)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.JoinedStr)
-        for piece in node.values
+        if isinstance(node, ast.Expr | ast.JoinedStr)
+        for part in (node.values if isinstance(node, ast.JoinedStr) else [node.value])
+        if isinstance(part, ast.Constant)
     }
     for node in ast.walk(tree):
+        text = ""
         if isinstance(node, ast.JoinedStr):
             text = "".join(
                 str(piece.value) if isinstance(piece, ast.Constant) else "{}"
                 for piece in node.values
             )
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            if id(node) in pieces or id(node) in aside:
-                continue
-            text = node.value
-        else:
-            continue
+        elif isinstance(node, ast.Constant) and id(node) not in parts:
+            text = node.value if isinstance(node.value, str) else ""
         if len(text.split()) > 2:
             yield node.lineno, text
     if "cli" in path.parts:
@@ -104,18 +97,37 @@ def public_docstrings():
     """Docstrings of what `import pamrs` offers, methods and properties included."""
     for name in pamrs.__all__:
         thing = getattr(pamrs, name)
-        if not (inspect.isclass(thing) or inspect.isfunction(thing)):
-            continue
-        yield name, inspect.getdoc(thing) or ""
-        for own, value in vars(thing).items() if inspect.isclass(thing) else ():
-            if not own.startswith("_"):
-                yield f"{name}.{own}", inspect.getdoc(value) or ""
+        if inspect.isclass(thing) or inspect.isfunction(thing):
+            yield name, inspect.getdoc(thing) or ""
+            yield from (
+                (f"{name}.{own}", inspect.getdoc(value) or "")
+                for own, value in (vars(thing).items() if inspect.isclass(thing) else ())
+                if not own.startswith("_")
+            )
 
 
 def test_public_docstrings_have_no_private_words():
     documented = dict(public_docstrings())
     assert len(documented) > 100
     assert not {name: words for name, text in documented.items() if (words := private_words(text))}
+
+
+#: Packages whose docstrings say at once what a thing is or does.
+OPENED = ("diagnosis", "findings", "report")
+INDIRECT = re.compile(r"(?:What|Whether|Where|How|Those|The same)\b")
+
+
+@pytest.mark.parametrize("package", OPENED)
+def test_docstrings_open_with_what_a_thing_is_or_does(package):
+    documented = [
+        (f"{path.relative_to(ROOT)}: {getattr(node, 'name', 'module')}", text)
+        for path in (ROOT / "python/pamrs" / package).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        and (text := ast.get_docstring(node))
+    ]
+    assert len(documented) > 90
+    assert not [(name, text) for name, text in documented if INDIRECT.match(text)]
 
 
 def test_words_of_effects_are_not_private():
