@@ -23,7 +23,7 @@ PACKAGES = {
     "cli": 1363,
     "control": 4596,
     "design": 530,
-    "diagnosis": 10996,
+    "diagnosis": 11019,
     "effects": 404,
     "experiments": 1052,
     "findings": 945,
@@ -47,7 +47,7 @@ ASIDE = {
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35841
+MOST = 35864
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -79,9 +79,9 @@ def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
         return False
     channels = [m.channel for m in _mismatches(stated)]
     own, before = (_noises(d.proven, channels) for d in (other, stated))
-    fewer = len(other.answer.named) < len(stated.answer.named)
-    doubtful = not stated.answer.named and stated.answer.parts and not other.answer.parts
-    return own**2 < _BETTER * before**2 or (bool(fewer or doubtful) and own < _NO_WORSE * before)
+    # a block whose values lie where they hardly can is as much in question as one with a name
+    open_to, was = (max(len(d.answer.named), len(d.answer.parts)) for d in (other, stated))
+    return own**2 < _BETTER * before**2 or (open_to < was and own < _NO_WORSE * before)
 
 
 def _mismatches(found: Diagnosis) -> list[BlockMismatch]:

@@ -4,9 +4,9 @@ Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_
 `autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
 `BlockLikelihood` (how probable recordings are);
 `weigh`, `explains`, `is_absent`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
-`possible_gain`, `Weighing` (their weights); `drop_undetermined`, `with_stated_std`, `is_outside`,
-`put_aside` (names that do not hold); `Judged`, `judge`, `case_probabilities`,
-`case_ambiguity`, `parameters_at_wall` (verdicts).
+`possible_gain`, `prior_loss`, `Weighing` (their weights); `drop_undetermined`, `with_stated_std`,
+`is_outside`, `put_aside` (names that do not hold); `Judged`, `judge`, `case_probabilities`,
+`case_ambiguity`, `is_unlikely`, `parameters_at_wall` (verdicts).
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from pamrs.diagnosis.evidence._verdicts import (
     are_alike,
     case_ambiguity,
     case_probabilities,
+    is_unlikely,
     judge,
     parameters_at_wall,
 )
@@ -46,6 +47,7 @@ from pamrs.diagnosis.evidence._weighing import (
     is_absent,
     log_weight,
     possible_gain,
+    prior_loss,
     probability_cap,
     same_recordings,
     share_left,
@@ -71,12 +73,14 @@ __all__ = [
     "explains",
     "is_outside",
     "is_absent",
+    "is_unlikely",
     "judge",
     "log_weight",
     "parts_of",
     "put_aside",
     "probability_cap",
     "possible_gain",
+    "prior_loss",
     "same_recordings",
     "share_left",
     "significant",

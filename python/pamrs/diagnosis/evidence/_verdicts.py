@@ -102,11 +102,11 @@ class Judged:
 
 def parameters_at_wall(group: BlockGroup) -> dict[str, float]:
     """Parameters that the refit without effects moved to their wall, and how far [tolerances]."""
-    return {
-        name: moved
-        for name, moved in group.candidates[0].fit.moved.items()
-        if abs(moved) >= WALL_TOLERANCES
-    }
+    return _at_wall(group.candidates[0].fit)
+
+
+def _at_wall(fit: Fit) -> dict[str, float]:
+    return {name: far for name, far in fit.moved.items() if abs(far) >= WALL_TOLERANCES}
 
 
 def _own(group: BlockGroup) -> dict[Hypothesis, float]:
@@ -118,8 +118,8 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
     shifted = any(significant(e) for e in group.nominal.values())
     explained = any(c.wrong and found.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates)
     quiet = {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
-    strained = parameters_at_wall(group) or _is_unlikely(group.candidates[0].fit)
-    if strained and group.mismatch is None and not explained:
+    unlikely = is_unlikely(group.candidates[0].fit)
+    if unlikely and group.mismatch is None and not explained:
         quiet = {PARAMETERS: _STRAINED_PARAMETERS, UNLISTED: _STRAINED_UNLISTED}
     elif not shifted:
         quiet |= {NONE: _QUIET_LIKELY, PARAMETERS: _QUIET_OTHER}
@@ -135,11 +135,15 @@ def _leaves_little(group: BlockGroup) -> bool:
     return bool(every) and max(e.systematic for e in every) < _LEAST_UNLISTED
 
 
-def _is_unlikely(fit: Fit) -> bool:
-    """True where moved parameters and starts of gases are rarer than one draw in a hundred."""
+def is_unlikely(fit: Fit) -> bool:
+    """True where a value is at its wall, or values inside their tolerances and starts of gases lie
+    further from what is known of them, together, than one in a hundred draws of them.
+    """
+    if _at_wall(fit):
+        return True
     moved = sum(abs(far) > 0.0 for far in fit.held_by_prior.values())
     starts = sum(found.strain > 0.0 for found in fit.residuals.values())
-    return chi2.sf(fit.strain + fit.start_strain, max(1, moved + starts)) < _UNLIKELY
+    return bool(chi2.sf(fit.strain + fit.start_strain, max(1, moved + starts)) < _UNLIKELY)
 
 
 def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Judged]:

@@ -176,7 +176,12 @@ def log_weight(
     less its price, its moved parameters and its rare values.
     """
     told = _evidence(candidate, baseline, suspects, share) - _strain(candidate)
-    return told - price(candidate, weighing.settings) - _rarity(candidate, weighing)
+    return told - prior_loss(candidate, weighing)
+
+
+def prior_loss(candidate: Candidate, weighing: Weighing) -> float:
+    """Loss of a hypothesis before any data: its price, and values that its physics hardly has."""
+    return price(candidate, weighing.settings) + _rarity(candidate, weighing)
 
 
 def _rarity(candidate: Candidate, weighing: Weighing) -> float:

@@ -2,23 +2,18 @@
 
 Public: `examine` (all of it, for some blocks), `Mismatch`, `refitted`, `with_autocorrelation` (the
 baseline alone), `find_misread`, `Reading`, `reading_errors` (other units of channels),
-`find_closure`, `free_suspects`, `find_wrong_values`, `suspected_values`.
+`find_closure`, `free_suspects`, `suspected_values`.
 """
 
 from pamrs.diagnosis.search._baseline import refitted, with_autocorrelation
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._hypotheses import Mismatch, examine
 from pamrs.diagnosis.search._readings import Reading, find_misread, reading_errors
-from pamrs.diagnosis.search._wrong_parameters import (
-    find_wrong_values,
-    free_suspects,
-    suspected_values,
-)
+from pamrs.diagnosis.search._wrong_parameters import free_suspects, suspected_values
 
 __all__ = [
     "Mismatch",
     "Reading",
-    "find_wrong_values",
     "examine",
     "find_closure",
     "free_suspects",

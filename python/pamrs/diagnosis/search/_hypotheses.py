@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from threadpoolctl import threadpool_limits
@@ -23,7 +23,9 @@ from pamrs.diagnosis.evidence import (
     are_alike,
     explains,
     is_absent,
+    is_unlikely,
     misses_only_held_out,
+    prior_loss,
     probability_cap,
     same_recordings,
     share_left,
@@ -82,8 +84,8 @@ from pamrs.diagnosis.search._sets import (
     with_freed_values,
 )
 from pamrs.diagnosis.search._wrong_parameters import (
-    find_wrong_values,
     free_suspects,
+    price_of_wrong,
     weigh_only_noise,
 )
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -224,14 +226,30 @@ def _begin_part(
         common = inner.losses.part(what, lambda: _fit_all_recordings(refit.trial, refit.start))
         if common is not None:
             tell("one baseline leaves noise in all recordings")
-            return OnlyNoise(refit, _healthy_group(refit, common))
+            return OnlyNoise(refit, _healthy_group(refit, common), tell)
     if refit.trial.suspects:
         return _tried(refit, tell)
-    quiet = refit.group([refit.start], {UNDECIDED: 1.0}, None)
-    trial = replace(refit.trial, suspects=blocks)
-    what = "the search for a value at the end of its range"
-    found = inner.losses.part(what, lambda: find_wrong_values(trial, quiet, tell), quiet)
-    return OnlyNoise(refit, found)
+    return OnlyNoise(refit, refit.group([refit.start], {UNDECIDED: 1.0}, None), tell)
+
+
+def _behind_values(refit: _Refit, tell: Say, *, effects: bool) -> dict[Candidate, float]:
+    """Hypotheses of blocks whose baseline leaves only noise, but moves parameters for it, each with
+    the logarithm of what it costs: values that the file may be wrong about and, if asked for,
+    effects, which the values may have followed.
+    """
+    trial, baseline = refit.trial, refit.start.fit
+    settings = trial.settings
+    if not effects:
+        found = free_suspects(trial, baseline, baseline, tell, share=0.0)
+        return {c: price_of_wrong(c, settings) for c in found}
+    work = _begun(refit, tell)
+    singles = [*_fit_singles(work.search), *_fit_events(work.search, work.own)]
+    there = [c for c in singles if not is_absent(c, settings.most_tolerances)]
+    near = work.search.heaviest_first(there)[: settings.most_polished]
+    ended = [trial.polish(c) if c in near else c for c in there]
+    return {c: price_of_wrong(c, settings) for c in work.mistaken} | {
+        c: prior_loss(c, work.search.weighing) for c in ended
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -603,11 +621,17 @@ class OnlyNoise:
     refit : _Refit
         The refit of their parameters.
     group : BlockGroup
-        The baseline, and values that the file may be wrong about.
+        The baseline.
+    tell : callable
+        Receives progress.
+    shared : list of Candidate
+        Effects that other blocks have, with the values that they have there.
     """
 
     refit: _Refit
     group: BlockGroup
+    tell: Say
+    shared: list[Candidate] = field(default_factory=list)
 
     def with_effects_of_others(self, starts: list[Start]) -> OnlyNoise:
         """Group after the effects that other blocks name were tried here: one is there where
@@ -628,13 +652,23 @@ class OnlyNoise:
                 own = both.fit
                 alike = (are_alike(own.values[n], v, own.std[n]) for n, v in start.free.items())
                 found += [both] if all(alike) else []
-        # what is there once is paid for once: the odds of both places are given for both
-        prices = dict.fromkeys(_best_of_each(found), math.log(SHARED_ODDS))
-        return replace(self, group=weigh_only_noise(self.group, prices))
+        return replace(self, shared=_best_of_each(found))
 
     def groups(self, _: Say) -> list[BlockGroup]:
-        """The blocks as one group."""
-        return [self.group]
+        """The blocks as one group, with values that the file may be wrong about, and with effects
+        of its own where its values are an unlikely draw of their tolerances, whatever others have.
+        """
+        baseline, refit = self.group.candidates[0], self.refit
+        if baseline is not refit.start:
+            return [self.group]
+        own = all(is_unlikely(c.fit) for c in (baseline, *self.shared))
+        whole = replace(refit, trial=replace(refit.trial, suspects=self.group.blocks))
+        work = partial(_behind_values, whole, self.tell, effects=own)
+        what = "the search for what moved values explain"
+        prices = refit.trial.inner.losses.part(what, work, {})
+        # what is there once is paid for once: the odds of both places are given for both
+        prices |= dict.fromkeys(self.shared, math.log(SHARED_ODDS))
+        return [weigh_only_noise(self.group, prices)]
 
 
 def _leading(weighed: Mapping[Hypothesis, float]) -> Hypothesis:

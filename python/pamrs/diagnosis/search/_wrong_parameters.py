@@ -27,6 +27,7 @@ from pamrs.diagnosis.fit import (
     two_at_a_time,
 )
 from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import UNDECIDED
 from pamrs.rig import Rig
 from pamrs.rig.schema import split_name
@@ -274,19 +275,12 @@ def _predicted_gain(
     return {loose: was - cost(loose) for loose in suspects}
 
 
-def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], None]) -> BlockGroup:
-    """Find the value that the file is wrong about, in a group whose baseline leaves only noise, but
-    moves parameters for it.
-
-    Each that promises it is freed. What speaks for it is how much more probable it makes recordings
-    and values, weighed against the odds of a file that is so wrong.
+def price_of_wrong(candidate: Candidate, settings: DiagnosisSettings) -> float:
+    """Logarithm of what wrong values cost where the baseline explains all: a file that is further
+    outside its tolerances is rarer, but less and less so.
     """
-    start = quiet.candidates[0]
-    found = free_suspects(trial, start.fit, start.fit, say, share=0.0)
-    # a file that is further outside its tolerances is rarer, but less and less so
-    settings, walls = trial.settings, trial.settings.most_tolerances
-    prices = {c: settings.file_log_odds * len(c.wrong) + c.outside(walls) for c in found}
-    return weigh_only_noise(quiet, prices)
+    outside = candidate.outside(settings.most_tolerances)
+    return settings.file_log_odds * len(candidate.wrong) + outside
 
 
 def weigh_only_noise(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> BlockGroup:
@@ -300,9 +294,7 @@ def weigh_only_noise(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> Bl
         if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)
     }
     top, kept_at = max(0.0, *scores.values(), 0.0), quiet.probabilities[UNDECIDED]
-    weights = {
-        c.hypothesis: kept_at * math.exp(max(-60.0, score - top)) for c, score in scores.items()
-    }
+    weights = {c.hypothesis: kept_at * math.exp(score - top) for c, score in scores.items()}
     kept = {h: p * math.exp(-top) for h, p in quiet.probabilities.items()}
     total = sum(weights.values()) + sum(kept.values())
     probabilities = {h: w / total for h, w in (kept | weights).items()}
