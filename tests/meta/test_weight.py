@@ -39,7 +39,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 26686,
+    "tests": 26685,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
