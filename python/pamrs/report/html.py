@@ -267,10 +267,13 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
     return rows
 
 
-def _limits(diagnosis: Findings) -> list[tuple[str, ...]]:
-    """Rows of sizes from which the recordings would have shown effects, and told them apart."""
+def _limits(diagnosis: Findings) -> list[tuple[bool | str, ...]]:
+    """Rows of sizes from which the recordings would have shown effects, and told them apart; first
+    of each, True where the effect is named.
+    """
     return [
         (
+            own.effect in diagnosis.answer.named,
             words.label(own.effect),
             words.spoken_name(own.block),
             words.label(own.size.rpartition(".")[2]),
