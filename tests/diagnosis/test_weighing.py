@@ -271,14 +271,14 @@ def test_inside_the_error_of_the_model_effects_get_a_few_steps(
     ]
     screened = SimpleNamespace(strong=strong, scores=lambda: scores)
     search = SimpleNamespace(screened=screened, start=SimpleNamespace(fit=None))
-    begun = SimpleNamespace(search=search, own=[], transient=[], mistaken=["wrong"])
-    monkeypatch.setattr(_hypotheses, "_begun", lambda refit, tell: begun)
+    state = SimpleNamespace(search=search, per_recording=[], transient=[], mistaken=["wrong"])
+    monkeypatch.setattr(_hypotheses, "_screen_mismatch", lambda refit, tell: state)
     shortly = SimpleNamespace(fit_shortly=lambda starts, _: starts[0].effect.id)
     refit = SimpleNamespace(
         error=({}, {"arm": 1.0}),
         error_is_given=False,
         start="start",
-        beside=lambda sizes: SimpleNamespace(trial=shortly),
-        beside_less=lambda candidates: candidates,
+        with_error_sizes=lambda sizes: SimpleNamespace(trial=shortly),
+        with_smaller_error=lambda candidates: candidates,
     )
-    assert _hypotheses._hidden(refit, print) == ["start", *tried, "wrong"]
+    assert _hypotheses._refit_with_smaller_model_error(refit, print) == ["start", *tried, "wrong"]

@@ -212,7 +212,7 @@ def _not_recorded(names: Iterable[str]) -> str:
     return f"{', '.join(named)} {'is' if few else 'are'} not in every recording"
 
 
-_PRESSURE = {
+_GAUGE_OF = {
     "supply": "supply_pressure",
     "line": "line_pressure",
     "chamber": "muscle_pressure",
@@ -221,7 +221,7 @@ _PRESSURE = {
 
 
 @dataclass(frozen=True)
-class _Way:
+class _FlowPath:
     """A valve or a line: its own full name, what it leads from and to (chambers, supplies and
     inlets of lines with a gauge, in full), the command that opens it, the line behind it.
     """
@@ -232,31 +232,33 @@ class _Way:
     between: tuple[str, ...]
 
 
-def _ways(rig: Rig, has: frozenset[str]) -> list[_Way]:
-    """Every way of the air; a valve and the line behind it are one, unless a gauge stands between
-    them.
+def _flow_paths(rig: Rig, has: frozenset[str]) -> list[_FlowPath]:
+    """All flow paths of the air; a valve and the line behind it are one, unless a gauge stands
+    between them.
     """
     valves, lines = rig.ports("valve"), rig.ports("line")
     cut = {n: not e["from"] and dotted("line_pressure", n) in has for n, e in lines.items()}
     behind = {qualified("line", n): ends["to"] for n, ends in lines.items() if not cut[n]}
-    found = []
+    paths = []
     for name, ends in valves.items():
         line = (ends["to"],) if ends["to"] in behind else ()
         end = behind.get(ends["to"], ends["to"])
-        found.append(
-            _Way(
+        paths.append(
+            _FlowPath(
                 qualified("valve", name),
                 (ends["from"], end),
                 (dotted("valve_command", name),),
                 line,
             )
         )
-    found += [
-        _Way(qualified("line", name), (ends["from"] or qualified("line", name), ends["to"]), (), ())
+    paths += [
+        _FlowPath(
+            qualified("line", name), (ends["from"] or qualified("line", name), ends["to"]), (), ()
+        )
         for name, ends in lines.items()
         if ends["from"] or cut[name]
     ]
-    return found
+    return paths
 
 
 class _Map:
@@ -265,7 +267,7 @@ class _Map:
     def __init__(self, rig: Rig, channels: tuple[str, ...]) -> None:
         self.rig, self.has = rig, frozenset(channels)
         self.thermometers = {n: c for n, c in thermometers_of(rig).items() if c in self.has}
-        self.ways = _ways(rig, self.has)
+        self.paths = _flow_paths(rig, self.has)
         self.angles = (
             ("length",)
             if rig.model["load"]
@@ -281,23 +283,23 @@ class _Map:
     def pressure(self, block: str) -> str:
         """Channel of the pressure of a supply, a chamber or a line's inlet by its full name."""
         kind, _, name = block.partition(".")
-        return dotted(_PRESSURE[kind], name)
+        return dotted(_GAUGE_OF[kind], name)
 
-    def around(self, block: str) -> list[_Way]:
-        """The ways that begin or end at a supply, a chamber or a line's inlet."""
-        return [way for way in self.ways if block in way.ends]
+    def around(self, block: str) -> list[_FlowPath]:
+        """The flow paths that begin or end at a supply, a chamber or a line's inlet."""
+        return [path for path in self.paths if block in path.ends]
 
     def neighbours(self, block: str) -> tuple[str, ...]:
         """Channels of the pressures next to a block; that of a constant supply is known without
         measuring it.
         """
         others = [
-            end for way in self.around(block) for end in way.ends if end not in (block, "ambient")
+            end for path in self.around(block) for end in path.ends if end not in (block, "ambient")
         ]
-        known = [end for end in others if self._unread(end, "constant", "regulator")]
+        known = [end for end in others if self._lacks_gauge(end, "constant", "regulator")]
         return tuple(dict.fromkeys(self.pressure(end) for end in others if end not in known))
 
-    def _unread(self, block: str, *kinds: str) -> bool:
+    def _lacks_gauge(self, block: str, *kinds: str) -> bool:
         """True where a block is a supply of one of these kinds whose pressure nobody measured."""
         block_kind, _, name = block.partition(".")
         return (
@@ -306,12 +308,12 @@ class _Map:
             and self.pressure(block) not in self.has
         )
 
-    def unread(self, block: str) -> list[str]:
+    def without_gauge(self, block: str) -> list[str]:
         """Names of the regulators next to a chamber whose outlet nobody measured: their command
         says what it is.
         """
-        ends = dict.fromkeys(end for way in self.around(block) for end in way.ends)
-        return [block_of(end) for end in ends if self._unread(end, "regulator")]
+        ends = dict.fromkeys(end for path in self.around(block) for end in path.ends)
+        return [block_of(end) for end in ends if self._lacks_gauge(end, "regulator")]
 
     def behind(self, supply: str) -> list[str]:
         """Names of the regulators whose inlet a supply is: what they let through is drawn from
@@ -329,7 +331,7 @@ class _Map:
     def commands(self, block: str) -> tuple[str, ...]:
         """Commands of the valves at a block."""
         return tuple(
-            dict.fromkeys(command for way in self.around(block) for command in way.command)
+            dict.fromkeys(command for path in self.around(block) for command in path.command)
         )
 
     def moved(self, block: str, *names: str) -> set[str]:
@@ -344,8 +346,8 @@ class _Map:
 
     def zero(self, key: str, name: str) -> str:
         """Dotted name of the zero of a block's sensor, its own or the common one."""
-        own = self.rig.tables("sensors")
-        return f"sensors.{name}.{key}" if name and name in own else f"sensors.{key}"
+        sensors = self.rig.tables("sensors")
+        return f"sensors.{name}.{key}" if name and name in sensors else f"sensors.{key}"
 
     def zeros(self, nodes: Iterable[str], joints: Iterable[str]) -> set[str]:
         """Zeros of the gauges at chambers, supplies and inlets of lines, given by their full names,
@@ -366,48 +368,48 @@ class _Map:
 
     def of(self, kind: str, *names: str) -> set[str]:
         """All parameters of some blocks of a kind."""
-        own = tuple(f"{qualified(kind, name)}." for name in names)
-        return {name for name in self.rig.parameters if name.startswith(own)}
+        prefixes = tuple(f"{qualified(kind, name)}." for name in names)
+        return {name for name in self.rig.parameters if name.startswith(prefixes)}
 
     def of_motion(self, joints: Iterable[str]) -> set[str]:
         """Parameters of what turns the lengths of muscles into the angles of some joints."""
-        there = set(joints)
-        pulling = [m for m, joint in self.joint_of.items() if joint in there]
-        return self.of("joint", *there) | self.of("transmission", *pulling)
+        named = set(joints)
+        pulling = [m for m, joint in self.joint_of.items() if joint in named]
+        return self.of("joint", *named) | self.of("transmission", *pulling)
 
-    def of_ways(self, block: str) -> set[str]:
+    def of_paths(self, block: str) -> set[str]:
         """Parameters of the valves and lines at a block."""
         names: set[str] = set()
-        for way in self.around(block):
-            for full in (way.name, *way.between):
+        for path in self.around(block):
+            for full in (path.name, *path.between):
                 kind, _, name = full.partition(".")
                 names |= self.moved(kind, name)
         return names
 
     def tubes_at(self, block: str) -> tuple[Tube, ...]:
-        """The tubes of segments among the ways at a block."""
+        """The tubes of segments among the flow paths at a block."""
         gas = self.rig.tables("gas")[""]
-        ends, found = self.rig.ports("line"), []
-        full = (name for way in self.around(block) for name in (way.name, *way.between))
+        ends, tubes = self.rig.ports("line"), []
+        full = (name for path in self.around(block) for name in (path.name, *path.between))
         for name in dict.fromkeys(full):
-            kind, _, own = name.partition(".")
-            table = self.rig.tables(kind)[own]
+            kind, _, place = name.partition(".")
+            table = self.rig.tables(kind)[place]
             if kind != "line" or not table.get("segments"):
                 continue
             sound = math.sqrt(table["alpha"] * gas["gas_constant"] * gas["temperature"])
             beginning, end = (
                 self.pressure(node) if node not in ("", "ambient") else ""
-                for node in (ends[own]["from"], ends[own]["to"])
+                for node in (ends[place]["from"], ends[place]["to"])
             )
-            found.append(Tube(name, beginning, end, table["length"] / sound))
-        return tuple(found)
+            tubes.append(Tube(name, beginning, end, table["length"] / sound))
+        return tuple(tubes)
 
     def nodes_at(self, block: str) -> set[str]:
         """Chambers, supplies and inlets of lines at which a block is cut, by their full names:
-        itself, where its ways lead, and what feeds a regulator that it simulates.
+        itself, where its flow paths lead, and what feeds a regulator that it simulates.
         """
-        ends = {block, *(end for way in self.around(block) for end in way.ends)} - {"ambient"}
-        simulated = [e for e in ends if e == block or self._unread(e, "regulator")]
+        ends = {block, *(end for path in self.around(block) for end in path.ends)} - {"ambient"}
+        simulated = [e for e in ends if e == block or self._lacks_gauge(e, "regulator")]
         supplies = self.rig.ports("supply")
         inlets = [
             supplies.get(block_of(e), {}).get("inlet", "")
@@ -427,16 +429,18 @@ class _Map:
         """
         full, table = qualified("supply", name), self.rig.tables("supply")[name]
         behind = self.behind(full)
-        unread = [one for one in behind if self._unread(qualified("supply", one), "regulator")]
-        own = [name] if table["kind"] == "regulator" else []
+        without_gauge = [
+            one for one in behind if self._lacks_gauge(qualified("supply", one), "regulator")
+        ]
+        itself = [name] if table["kind"] == "regulator" else []
         nodes = (full, *(qualified("supply", one) for one in behind))
         read = [self.pressure(node) for node in nodes[1:]]
         drives = (
             *(channel for node in nodes for channel in self.neighbours(node)),
             *(channel for channel in read if channel in self.has),
-            *(channel for one in own for channel in self.in_front(one)),
+            *(channel for one in itself for channel in self.in_front(one)),
             *(command for node in nodes for command in self.commands(node)),
-            *(dotted("supply_command", one) for one in (*own, *unread)),
+            *(dotted("supply_command", one) for one in (*itself, *without_gauge)),
         )
         drives = tuple(dict.fromkeys(drives))
         covers = "regulator" if table["kind"] == "regulator" else "supply"
@@ -448,19 +452,19 @@ class _Map:
             else (" and line" if table["kind"] != "regulator" else "")
         )
         covers += _called(name)
-        if not any(self.around(node) for node in nodes) or self._unread(
+        if not any(self.around(node) for node in nodes) or self._lacks_gauge(
             full, "constant", "regulator"
         ):
             return None
-        if any(not way.command for node in nodes[1:] for way in self.around(node)):
+        if any(not path.command for node in nodes[1:] for path in self.around(node)):
             # noise of two gauges at a line goes both ways, and is drawn one way
             why = "a regulator that it feeds has a line behind it, and no valve"
             return Unjudged(full, covers, why)
         if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
             return lacking
-        names = self.moved("supply", name, *(behind if unread else ()))
+        names = self.moved("supply", name, *(behind if without_gauge else ()))
         for node in nodes:
-            names |= self.of_ways(node) | self.zeros(self.nodes_at(node), ())
+            names |= self.of_paths(node) | self.zeros(self.nodes_at(node), ())
         return Block(
             full,
             self.pressure(full),
@@ -469,7 +473,7 @@ class _Map:
             frozenset(names),
             _GAS_STEP,
             covers,
-            ("supply",) if unread else (),
+            ("supply",) if without_gauge else (),
             tubes=self.tubes_at(full),
         )
 
@@ -478,8 +482,8 @@ class _Map:
         its pressure is then what is given.
         """
         full = qualified("chamber", name)
-        unread = self.unread(full)
-        fed = bool(self.neighbours(full) or self.commands(full) or unread)
+        without_gauge = self.without_gauge(full)
+        fed = bool(self.neighbours(full) or self.commands(full) or without_gauge)
         joints = tuple(
             dict.fromkeys(
                 self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name
@@ -490,7 +494,7 @@ class _Map:
             if fed
             else "chamber"
         )
-        covers = (f"regulator, {covers}" if unread else covers) + _called(name)
+        covers = (f"regulator, {covers}" if without_gauge else covers) + _called(name)
         if self.angles and not self.rig.tables("valve") and not self.rig.tables("supply"):
             return Unjudged(
                 full, covers, "nothing feeds it: its pressure is what drives the muscle"
@@ -498,16 +502,16 @@ class _Map:
         drives = (
             *self.neighbours(full),
             *self.commands(full),
-            *(dotted("supply_command", supply) for supply in unread),
-            *(channel for supply in unread for channel in self.in_front(supply)),
+            *(dotted("supply_command", supply) for supply in without_gauge),
+            *(channel for supply in without_gauge for channel in self.in_front(supply)),
             *(a for a in self.angles if block_of(a) in joints),
         )
         if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
             return lacking
         names = (
-            self.of_ways(full)
+            self.of_paths(full)
             | self.moved("chamber", name)
-            | self.moved("supply", *unread)
+            | self.moved("supply", *without_gauge)
             | self.zeros(self.nodes_at(full), joints or [""])
         )
         step = _GAS_STEP if fed else _SEALED_STEP
@@ -520,7 +524,7 @@ class _Map:
             frozenset(names),
             step,
             covers,
-            ("supply",) if unread else (),
+            ("supply",) if without_gauge else (),
             self.tubes_at(full),
             self.thermometers.get(name, ""),
             warm=self.warm(name),
@@ -563,18 +567,22 @@ class _Map:
         full = qualified("line", name)
         if self.pressure(full) not in self.has or not self.commands(full):
             return None
-        unread = self.unread(full)
+        without_gauge = self.without_gauge(full)
         drives = (
             *self.neighbours(full),
             *self.commands(full),
-            *(dotted("supply_command", supply) for supply in unread),
-            *(channel for supply in unread for channel in self.in_front(supply)),
+            *(dotted("supply_command", supply) for supply in without_gauge),
+            *(channel for supply in without_gauge for channel in self.in_front(supply)),
         )
-        covers = ("regulator and valve" if unread else "valve and line inlet") + _called(name)
+        covers = ("regulator and valve" if without_gauge else "valve and line inlet") + _called(
+            name
+        )
         if lacking := self.lacking(full, covers, (*drives, *self.angles)):
             return lacking
         names = (
-            self.of_ways(full) | self.moved("supply", *unread) | self.zeros(self.nodes_at(full), ())
+            self.of_paths(full)
+            | self.moved("supply", *without_gauge)
+            | self.zeros(self.nodes_at(full), ())
         )
         return Block(
             full,
@@ -584,7 +592,7 @@ class _Map:
             frozenset(names),
             _GAS_STEP,
             covers,
-            ("supply",) if unread else (),
+            ("supply",) if without_gauge else (),
             self.tubes_at(full),
         )
 
@@ -693,20 +701,20 @@ def _all_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block | Unjudged]:
     whole = _Map(rig, closed)
 
     def chamber(name: str) -> Block | Unjudged:
-        found = whole.chamber(name)
-        return found if isinstance(found, Block) else have.chamber(name)
+        block = whole.chamber(name)
+        return block if isinstance(block, Block) else have.chamber(name)
 
     chambers = [chamber(name) for name in rig.tables("chamber")]
-    found = [
+    blocks = [
         *(have.supply(name) for name in rig.tables("supply")),
         *(have.inlet(name) for name in rig.tables("line")),
         *chambers,
-        *(have.temperature(own) for own in chambers),
+        *(have.temperature(block) for block in chambers),
         *((have.arm(name) for name in rig.tables("joint")) if rig.tables("arm") else ()),
         *([have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else ()),
         *(have.pull(name) for name in pulls_of(rig)),
     ]
-    return [block for block in found if block is not None]
+    return [block for block in blocks if block is not None]
 
 
 @dataclass(frozen=True, eq=False)
