@@ -39,9 +39,9 @@ def worst_block(problem: Problem, noise_level: Mapping[Key, NoiseLevel]) -> Bloc
 
     def missed(block: Block) -> float:
         means = [
-            means_in_noises(p, found, noise_level[block.name, p.recording.name])[1]
+            means_in_noises(p, left, noise_level[block.name, p.recording.name])[1]
             for p in problem.recordings
-            for found in [residual(block, problem.core, p, [])]
+            for left in [residual(block, problem.core, p, [])]
         ]
         every = np.concatenate(means)
         return float(np.mean(every**2)) if every.size else 0.0
@@ -81,37 +81,37 @@ def missing_input_of(
     MissingInput or None
         None where no recording was followed.
     """
-    told, parts = [], []
+    recorded, parts = [], []
     for role, each in recordings.items():
         for prepared in each:
             name = prepared.recording.name
             noise = noise_level[block.name, name].noise
-            found = _followed(block, core, prepared, noise)
-            if found is None:
+            followed = _followed(block, core, prepared, noise)
+            if followed is None:
                 continue
             # a force shortens the muscle, and its length is what is measured
             sign = -1.0 if channel_of(block.name) == "load" else 1.0
             law = None
             rest = None if named is None else _followed(block, named, prepared, noise)
             if rest is not None and rest.time.size:
-                law = sign * (found.value - np.interp(found.time, rest.time, rest.value))
-            parts.append(found)
-            told.append(
+                law = sign * (followed.value - np.interp(followed.time, rest.time, rest.value))
+            parts.append(followed)
+            recorded.append(
                 MissingRecording(
                     name,
                     role,
-                    found.time,
-                    sign * found.value,
-                    found.std,
-                    _arguments(block, prepared, found.time),
-                    math.sqrt(found.before),
-                    math.sqrt(found.after),
+                    followed.time,
+                    sign * followed.value,
+                    followed.std,
+                    _arguments(block, prepared, followed.time),
+                    math.sqrt(followed.before),
+                    math.sqrt(followed.after),
                     law,
                 )
             )
-    if not told:
+    if not recorded:
         return None
-    return _told(block, told, parts, margin)
+    return _told(block, recorded, parts, margin)
 
 
 def _followed(
@@ -125,20 +125,20 @@ def _followed(
 
 
 def _told(
-    block: Block, told: list[MissingRecording], parts: list[Reconstruction], margin: float
+    block: Block, recorded: list[MissingRecording], parts: list[Reconstruction], margin: float
 ) -> MissingInput:
     """Missing input along all recordings, with words on what it depends on."""
-    bins = [own.bins for own in parts]
+    bins = [part.bins for part in parts]
     before, after = (
-        float(np.average([getattr(own, n) for own in parts], weights=bins))
+        float(np.average([getattr(part, n) for part in parts], weights=bins))
         for n in ("before", "after")
     )
-    units = {name: _unit(name) for name in ("time", *told[0].arguments)}
+    units = {name: _unit(name) for name in ("time", *recorded[0].arguments)}
     unit = INPUT_UNITS.get(channel_of(block.name)) or unit_of(block.channel)
     above = before > margin
     share = 1.0 - max(0.0, after - 1.0) / (before - 1.0) if above else 0.0
-    position = block.channel if has_port(block) or not _moving(told) else _moving(told)[0]
-    found = MissingInput(
+    position = block.channel if has_port(block) or not _moving(recorded) else _moving(recorded)[0]
+    missing = MissingInput(
         block.name,
         unit,
         "nothing above the noise",
@@ -150,14 +150,14 @@ def _told(
         position,
         _rate(position),
         units,
-        told,
+        recorded,
     )
-    return with_words(found) if above else found
+    return with_words(missing) if above else missing
 
 
-def _moving(told: Collection[MissingRecording]) -> list[str]:
+def _moving(recorded: Collection[MissingRecording]) -> list[str]:
     """Angles and lengths among the arguments."""
-    return [n for own in told for n in own.arguments if channel_of(n) in _MOTION]
+    return [n for recording in recorded for n in recording.arguments if channel_of(n) in _MOTION]
 
 
 def _rate(channel: str) -> str:
@@ -180,14 +180,14 @@ def _arguments(block: Block, prepared: Prepared, time: Array) -> dict[str, Array
     """Measurements along an input: what the block predicts, what drives it, the rates of both
     where they move, and the commands.
     """
-    own = np.arange(prepared.n) * prepared.dt
-    found = {}
+    clock = np.arange(prepared.n) * prepared.dt
+    arguments = {}
     for name in dict.fromkeys((block.channel, *block.drives)):
         if name in prepared.signals:
             value, slope = prepared.signals[name]
-            found[name] = np.interp(time, own, value)
+            arguments[name] = np.interp(time, clock, value)
             if name == block.channel or channel_of(name) in _MOTION:
-                found[_rate(name)] = np.interp(time, own, slope)
+                arguments[_rate(name)] = np.interp(time, clock, slope)
         elif name in prepared.commands:
-            found[name] = np.interp(time, own, prepared.commands[name])
-    return found
+            arguments[name] = np.interp(time, clock, prepared.commands[name])
+    return arguments

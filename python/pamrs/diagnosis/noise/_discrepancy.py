@@ -160,12 +160,12 @@ def _size(stated: Stated, name: str, ranges: OperatingRanges) -> float:
     return math.hypot(error.get("size", 0.0), error.get("share", 0.0) * ranges[name][1])
 
 
-def _shares(stated: Stated, kinds: tuple[str, ...], own: str | None = None) -> float:
-    """The shares of some kinds of block together; of those with a name those called `own` alone."""
-    there = [n for n in stated if channel_of(n) in kinds]
-    if own is not None:
-        there = [n for n in there if block_of(n) in ("", own)]
-    return math.hypot(*(stated[n].get("share", 0.0) for n in there))
+def _shares(stated: Stated, kinds: tuple[str, ...], name: str | None = None) -> float:
+    """The shares of some kinds of block together; of those with a name those called `name` alone."""
+    named = [n for n in stated if channel_of(n) in kinds]
+    if name is not None:
+        named = [n for n in named if block_of(n) in ("", name)]
+    return math.hypot(*(stated[n].get("share", 0.0) for n in named))
 
 
 def _flow_errors(block: Block, ranges: OperatingRanges, stated: Stated) -> list[tuple[str, float]]:

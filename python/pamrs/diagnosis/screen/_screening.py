@@ -146,17 +146,17 @@ class Screen:
         without : tuple of Term
             Effects to leave out, with those that cannot act beside them.
         """
-        own = self.tangent if tangent is None else tangent
-        found = []
+        space = self.tangent if tangent is None else tangent
+        scores = []
         for effect, start, signature in self.signatures:
             if effect.excluded_by(without):
                 continue
-            power = own.power(signature)
+            power = space.power(signature)
             if power < _INVISIBLE:
                 continue
-            size, gain = _best_size(float(own.left @ signature), power, start)
-            found.append(Score(effect, start, gain, size, signature))
-        return sorted(found, key=lambda s: -s.gain)
+            size, gain = _best_size(float(space.left @ signature), power, start)
+            scores.append(Score(effect, start, gain, size, signature))
+        return sorted(scores, key=lambda s: -s.gain)
 
 
 def _best_size(along: float, power: float, start: Start) -> tuple[float, float]:
@@ -175,10 +175,10 @@ def _best_size(along: float, power: float, start: Start) -> tuple[float, float]:
 
 def by_effect(scores: list[Score]) -> dict[Term, list[Score]]:
     """Scores of each effect, effects and starts in the order of their gain."""
-    found: dict[Term, list[Score]] = {}
+    ranked: dict[Term, list[Score]] = {}
     for score in scores:
-        found.setdefault(score.effect, []).append(score)
-    return found
+        ranked.setdefault(score.effect, []).append(score)
+    return ranked
 
 
 def best_of_each_kind(scores: list[Score]) -> list[Score]:
@@ -393,13 +393,13 @@ def _values(start: Start) -> _Values:
 
 def _measured(problem: Problem, channel: str) -> Array | None:
     """Everything that was measured of the channels of one kind; None where there is none."""
-    seen = [
+    measured = [
         p.signals[name][0]
         for p in problem.recordings
         for name in p.signals
         if channel_of(name) == channel
     ]
-    return np.concatenate(seen) if seen else None
+    return np.concatenate(measured) if measured else None
 
 
 def _moved_to_action(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:

@@ -11,7 +11,7 @@ from pamrs.effects import Hypothesis, Term
 
 def fit_considered(search: Search) -> list[Candidate]:
     """Fit what of each hypothesis that the caller asks for acts in the blocks of a mismatch."""
-    trial, found = search.trial, list[Candidate]()
+    trial, fitted = search.trial, list[Candidate]()
     for asked in trial.inner.considered:
         acting = [t for t in asked.terms if any(concerns(t, b) for b in trial.suspects)]
         # what may happen at times of its own is looked for beside what lasts
@@ -26,8 +26,8 @@ def fit_considered(search: Search) -> list[Candidate]:
         best = search.start if not wrong else trial.fit_freed(wrong, search.start.fit)
         for effect in effects:
             best = None if best is None else _add_effect(search, best, effect)
-        found += [] if best is None else [best]
-    return found
+        fitted += [] if best is None else [best]
+    return fitted
 
 
 def _add_effect(search: Search, beside: Candidate, effect: Term) -> Candidate | None:
