@@ -254,8 +254,8 @@ class Attempts:
         self, inside: Mapping[Key, Residual], outside: Mapping[Key, Residual]
     ) -> Callable[[], Mapping[str, BlockLikelihood]]:
         """Likelihood of a hypothesis's residuals by block, worked out when it is asked for."""
-        left_by_key = inside if self.same else {**inside, **outside}
-        return cache(partial(self.likelihood.of, left_by_key))
+        residuals_of_all = inside if self.same else {**inside, **outside}
+        return cache(partial(self.likelihood.of, residuals_of_all))
 
     @property
     def same(self) -> bool:

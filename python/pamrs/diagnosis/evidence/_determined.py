@@ -26,11 +26,11 @@ def with_stated_std(problem: Problem, group: BlockGroup, candidate: Candidate) -
     """Candidate with the standard deviations that are reported: by how much pieces of the
     recordings disagree, times ``spread_factor`` for parameters that no prior holds.
     """
-    own, factor = replace(problem, blocks=group.blocks), problem.settings.spread_factor
+    part, factor = replace(problem, blocks=group.blocks), problem.settings.spread_factor
     known = candidate.fit.held_by_prior
     std = {
         name: spread * (1.0 if name in known else factor)
-        for name, spread in spread_over_pieces(own, candidate.fit).items()
+        for name, spread in spread_over_pieces(part, candidate.fit).items()
     }
     return replace(candidate, fit=replace(candidate.fit, std=std))
 
@@ -56,7 +56,7 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
         With other probabilities; the same where every single name is determined.
     """
     settings = problem.settings
-    found = dict(group.probabilities)
+    probabilities = dict(group.probabilities)
     to = _without_name(group)
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
@@ -66,15 +66,15 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
         inside = may_be_inside(stated, settings.most_tolerances, _DETERMINED_STDS)
         if inside or _has_undetermined_effect(stated):
             lost = 1.0 if candidate.wrong and to == UNDECIDED else 0.5
-            found[candidate.hypothesis] -= lost * chance
-            found[to] = found.get(to, 0.0) + lost * chance
-    return replace(group, probabilities=found)
+            probabilities[candidate.hypothesis] -= lost * chance
+            probabilities[to] = probabilities.get(to, 0.0) + lost * chance
+    return replace(group, probabilities=probabilities)
 
 
-def is_outside(found: Fit, name: str, settings: DiagnosisSettings) -> bool:
+def is_outside(fitted: Fit, name: str, settings: DiagnosisSettings) -> bool:
     """True where a fitted value is at least one standard deviation outside its tolerances."""
     walls = settings.most_tolerances
-    return not value_may_be_inside(found, name, walls, _DETERMINED_STDS)
+    return not value_may_be_inside(fitted, name, walls, _DETERMINED_STDS)
 
 
 def _has_undetermined_effect(candidate: Candidate) -> bool:
@@ -83,23 +83,23 @@ def _has_undetermined_effect(candidate: Candidate) -> bool:
 
     What happened at times of its own in single recordings is told by when it happened.
     """
-    found = candidate.fit
-    happened = None if found.events is None else found.events.effect
-    names = list(found.values)
+    fitted = candidate.fit
+    happened = None if fitted.events is None else fitted.events.effect
+    names = list(fitted.values)
     for effect in (e for e in candidate.effects if e != happened):
-        sizes = fitted_sizes(found, effect)
+        sizes = fitted_sizes(fitted, effect)
         if not sizes:
             continue
         at = [names.index(name) for name in sizes]
-        own, std = np.array([(found.values[n], found.std[n]) for n in sizes]).T
-        spread = found.covariance[np.ix_(at, at)]
+        values, std = np.array([(fitted.values[n], fitted.std[n]) for n in sizes]).T
+        spread = fitted.covariance[np.ix_(at, at)]
         narrow = np.sqrt(np.diag(spread))
         if not (np.isfinite(std).all() and (narrow > 0.0).all()):
             if not np.isfinite(std).any():
                 return True
             continue
         spread = spread * np.outer(std / narrow, std / narrow)
-        distance = own @ np.linalg.pinv(spread, hermitian=True) @ own
+        distance = values @ np.linalg.pinv(spread, hermitian=True) @ values
         if is_near_none(distance, len(sizes), _DETERMINED_STDS):
             return True
     return False
@@ -109,14 +109,14 @@ def put_aside(group: BlockGroup, hypothesis: Hypothesis) -> BlockGroup:
     """Remove a hypothesis from a group, and rescale the probabilities of the others to 1; where
     none is left, all goes to ``unlisted``, or to `UNDECIDED` where only noise is left.
     """
-    found = {h: p for h, p in group.probabilities.items() if h != hypothesis}
-    total = sum(found.values())
+    probabilities = {h: p for h, p in group.probabilities.items() if h != hypothesis}
+    total = sum(probabilities.values())
     if total > 0.0:
-        found = {h: p / total for h, p in found.items()}
+        probabilities = {h: p / total for h, p in probabilities.items()}
     else:
-        found[_without_name(group)] = 1.0
-    kept = [c for c in group.candidates if c.hypothesis != hypothesis]
-    return replace(group, candidates=kept, probabilities=found)
+        probabilities[_without_name(group)] = 1.0
+    candidates = [c for c in group.candidates if c.hypothesis != hypothesis]
+    return replace(group, candidates=candidates, probabilities=probabilities)
 
 
 def _without_name(group: BlockGroup) -> Hypothesis:

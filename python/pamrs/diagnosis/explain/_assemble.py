@@ -144,7 +144,7 @@ def assemble(
         wrong_parameters=_wrong(models, fitted, conclusion.table),
         measured=list(case.channels),
         residuals=_block_table(groups),
-        tried=_tried(groups),
+        tried=_tried_sets(groups),
         considered=part("what was asked for", lambda: _considered(judged, fitted), []),
         tested=part("the list of what was tested", lambda: _tested(groups), []),
         free_run=conclusion.runs,
@@ -214,7 +214,7 @@ def _forms(models: Models, fitted: Problem) -> dict[str, str]:
     return sentences
 
 
-def _tried(groups: list[BlockGroup]) -> list[Tried]:
+def _tried_sets(groups: list[BlockGroup]) -> list[Tried]:
     """Every fitted set of effects, with what it leaves of each block's excess."""
     return [
         Tried(

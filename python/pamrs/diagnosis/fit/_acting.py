@@ -70,14 +70,14 @@ def places_of(rig: Rig, effect: str, blocks: Sequence[Block]) -> list[str]:
     info = EFFECTS[effect]
     if not info.at or info.last_only or (info.transient and not info.own):
         return []
-    found = [
+    places = [
         name
         for name in rig.tables(info.at)
         if name
         and any(acts_in(Term(effect, name), block) for block in blocks)
         and _possible(rig, effect, name)
     ]
-    return found if len(found) > 1 else []
+    return places if len(places) > 1 else []
 
 
 def _possible(rig: Rig, effect: str, at: str) -> bool:

@@ -292,16 +292,16 @@ def residuals(
         if events is not None and at not in happened:  # nothing here could be differentiated
             relevant = [name for name in relevant if effect_of(name) != events.effect]
         in_core = [name for name in relevant if name not in steps]
-        left = residual(block, cores[at], prepared, core_names(rig, in_core))
+        block_residual = residual(block, cores[at], prepared, core_names(rig, in_core))
         if in_core == list(names):
-            return left
-        full = np.zeros((left.value.size, len(names)))
+            return block_residual
+        full = np.zeros((block_residual.value.size, len(names)))
         if in_core:
-            full[:, [list(names).index(name) for name in in_core]] = left.jacobian
+            full[:, [list(names).index(name) for name in in_core]] = block_residual.jacobian
         for name in set(relevant) - set(in_core):
-            shifted_value = change(block, shifted[name][at], prepared, left)
-            full[:, list(names).index(name)] = (left.value - shifted_value) / steps[name]
-        return replace(left, jacobian=full)
+            shifted_value = change(block, shifted[name][at], prepared, block_residual)
+            full[:, list(names).index(name)] = (block_residual.value - shifted_value) / steps[name]
+        return replace(block_residual, jacobian=full)
 
     return _everywhere(problem, residual_of)
 
@@ -461,7 +461,7 @@ def bin_width(prepared: Prepared, seconds: float) -> int:
 
 
 def stacked(
-    problem: Problem, left: Residuals, inflation: dict[str, float]
+    problem: Problem, block_residuals: Residuals, inflation: dict[str, float]
 ) -> tuple[Array, Array | None]:
     """Residuals of all blocks and recordings as one vector of bin means in units of their standard
     deviation.
@@ -470,7 +470,7 @@ def stacked(
     ----------
     problem : Problem
         Blocks and recordings.
-    left : dict
+    block_residuals : dict
         Their residuals.
     inflation : dict of str to float
         As in :func:`fit`.
@@ -486,7 +486,7 @@ def stacked(
     for prepared in problem.recordings:
         for block in problem.blocks:
             key = block.name, prepared.recording.name
-            r = left[key]
+            r = block_residuals[key]
             mean, counts = binned(r.value, r.rows, bin_width(prepared, FIT_BIN_TIME))
             variance = apart.get(key, inflation[block.name])
             weight = np.sqrt(counts) / (r.noise * math.sqrt(variance))
@@ -663,12 +663,12 @@ def fit(
 
     def evaluate(x: Array) -> tuple[Array, Array, Residuals]:
         try:
-            left = residuals(problem, scaling.rig(x, fixed or {}), scaling.names, events)
+            block_residuals = residuals(problem, scaling.rig(x, fixed or {}), scaling.names, events)
         except SimulationError as error:
             refused.append(error)
             raise
         refused.append(None)
-        rows, slope = stacked(problem, left, inflation)
+        rows, slope = stacked(problem, block_residuals, inflation)
         slopes = np.array(
             [scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)]
         )
@@ -677,7 +677,7 @@ def fit(
         return (
             np.concatenate([rows, bound * x[:count], usual_rows]),
             np.concatenate([jacobian, prior, usual_slopes]),
-            left,
+            block_residuals,
         )
 
     start = scaling.start.copy()
@@ -685,7 +685,7 @@ def fit(
         if warm is not None and name in warm.values:
             start[index] = in_tolerances(scaling.known[name], warm.values[name])
     limit = settings.fit_evaluations if evaluations is None else evaluations
-    x, (values, jacobian, left), spent = levenberg_marquardt(
+    x, (values, jacobian, block_residuals), spent = levenberg_marquardt(
         evaluate, start, scaling.bounds, limit, share
     )
     covariance: Array = np.zeros((0, 0))
@@ -710,7 +710,7 @@ def fit(
         std,
         covariance,
         0.5 * float(values @ values),
-        left,
+        block_residuals,
         moved,
         spent,
         scales,

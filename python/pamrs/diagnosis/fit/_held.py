@@ -46,7 +46,7 @@ def known_parameters(rig: Rig) -> dict[str, Parameter]:
     a share of the value: that deviation came from a model in which what is looked for now was still
     missing, and maybe from the same recordings.
     """
-    found = dict(rig.parameters)
+    parameters = dict(rig.parameters)
     spread = rig.effect_std
     for full, entry in named_entries(rig):
         known = spread.get(full, {})
@@ -55,8 +55,8 @@ def known_parameters(rig: Rig) -> dict[str, Parameter]:
             least = _HELD_SHARE * abs(value)
             tol = 0.0 if info.role in _FIXED else max(known.get(info.name, 0.0), least)
             name = f"{full}.{info.name}"
-            found[name] = Parameter(name, value, info.unit, tol, info.lower, info.upper)
-    return found
+            parameters[name] = Parameter(name, value, info.unit, tol, info.lower, info.upper)
+    return parameters
 
 
 def with_known(
@@ -74,12 +74,12 @@ def with_known(
         Standard deviations of effects' parameters, SI, by dotted name; others stay as they are.
     """
     given = std or {}
-    spread, own = rig.effect_std, set()
+    spread, of_effects = rig.effect_std, set()
     for full, entry in named_entries(rig):
         names = {f"{full}.{short}": short for short in entry["parameters"]}
         mine = {short: values[name] for name, short in names.items() if name in values}
         known = {short: given[name] for name, short in names.items() if name in given}
-        own |= set(names)
+        of_effects |= set(names)
         if mine or known:
             rig = rig.with_effect(
                 entry["id"],
@@ -88,7 +88,7 @@ def with_known(
                 at=entry.get("at", ""),
                 form=entry.get("form", ""),
             )
-    rest = {name: value for name, value in values.items() if name not in own}
+    rest = {name: value for name, value in values.items() if name not in of_effects}
     return rig.with_parameters(rest) if rest else rig
 
 
@@ -107,10 +107,10 @@ def largest_value(rig: Rig, name: str) -> float:
     the pull of the muscle, no reading drifts by more than a tenth of the pressure that there can be
     or of the force that it makes.
     """
-    effect, own = effect_of(name), find_parameter(name)
-    most = EFFECTS[effect.id].most.get(own.name) if effect else None
+    effect, info = effect_of(name), find_parameter(name)
+    most = EFFECTS[effect.id].most.get(info.name) if effect else None
     if most is None:
-        return own.upper
+        return info.upper
     pressures = [t["initial_pressure"] for t in rig.tables("supply").values()]
     pressure = max([rig.limits.get("max_pressure", 0.0), *pressures]) or _USUAL_PRESSURE
     muscles = rig.tables("muscle")
@@ -119,9 +119,9 @@ def largest_value(rig: Rig, name: str) -> float:
     sizes = {
         "pull": pull,
         "pull per pressure": pull / pressure,
-        "drift": _MOST_DRIFT * (pull * count if own.unit == "N" else pressure),
+        "drift": _MOST_DRIFT * (pull * count if info.unit == "N" else pressure),
     }
-    return min(own.upper, sizes[most])
+    return min(info.upper, sizes[most])
 
 
 def moved_value(known: Parameter, tolerances: float) -> float:

@@ -74,7 +74,7 @@ class Shaken:
         rows = _by_recording(problem, base, inflation)
         columns: dict[float, dict[str, Array]] = {}
         for frequency in frequencies:
-            found = []
+            changes_found = []
             for size in sizes:
                 unit = size.default or max(size.starts)
                 alone = {p.name: unit if p is size else 0.0 for p in sizes}
@@ -85,10 +85,10 @@ class Shaken:
                     moved = _by_recording(problem, changes(problem, model, base, effect), inflation)
                 except SimulationError:
                     break  # so large a torque leaves the range in which the model holds
-                found.append({name: (moved[name] - rows[name]) / unit for name in rows})
-            if len(found) == len(sizes):
+                changes_found.append({name: (moved[name] - rows[name]) / unit for name in rows})
+            if len(changes_found) == len(sizes):
                 columns[frequency] = {
-                    name: np.stack([one[name] for one in found], axis=1) for name in rows
+                    name: np.stack([one[name] for one in changes_found], axis=1) for name in rows
                 }
         return Shaken(effect, rows, columns)
 
@@ -96,19 +96,19 @@ class Shaken:
         """The frequencies that take most of the residuals, with the sizes of each recording; None
         where there are not as many as the form has.
         """
-        own = self.effect.info.form(form)
-        places = [p.name for p in own.parameters if p.scan is not None]
-        sizes = [p.name for p in own.parameters if p.scan is None]
+        shape = self.effect.info.form(form)
+        places = [p.name for p in shape.parameters if p.scan is not None]
+        sizes = [p.name for p in shape.parameters if p.scan is None]
         chosen = itertools.combinations(self.columns, len(places))
         best = max(chosen, key=self._gain, default=None)
         if best is None:
             return None
-        told = dict(zip(places, best, strict=True))
+        at_lines = dict(zip(places, best, strict=True))
         values = {
-            name: dict(zip(sizes, map(float, self._solved(best, name)), strict=True)) | told
+            name: dict(zip(sizes, map(float, self._solved(best, name)), strict=True)) | at_lines
             for name in self.rows
         }
-        order = [p.name for p in own.parameters]
+        order = [p.name for p in shape.parameters]
         return Events(self.effect, {n: {p: v[p] for p in order} for n, v in values.items()}, form)
 
     def _columns(self, lines: tuple[float, ...], name: str) -> Array:
@@ -124,17 +124,17 @@ class Shaken:
         """Reduction of the sum of squares of all recordings by some lines."""
         gain = 0.0
         for name, rows in self.rows.items():
-            left = rows + self._columns(lines, name) @ self._solved(lines, name)
-            gain += float(rows @ rows - left @ left)
+            rest = rows + self._columns(lines, name) @ self._solved(lines, name)
+            gain += float(rows @ rows - rest @ rest)
         return gain
 
 
 def _by_recording(
-    problem: Problem, found: dict[Key, Residual], inflation: dict[str, float]
+    problem: Problem, block_residuals: dict[Key, Residual], inflation: dict[str, float]
 ) -> dict[str, Array]:
     """Stacked residuals of each recording."""
     return {
-        p.recording.name: stacked(replace(problem, recordings=[p]), found, inflation)[0]
+        p.recording.name: stacked(replace(problem, recordings=[p]), block_residuals, inflation)[0]
         for p in problem.recordings
     }
 
@@ -143,7 +143,7 @@ def _lines(
     effect: Term, scanned: EffectParameter, problem: Problem, base: dict[Key, Residual]
 ) -> list[float]:
     """Lines of the spectrum of what is left in the blocks in which an effect acts [Hz]."""
-    there = [
+    series = [
         (base[b.name, p.recording.name], p.dt)
         for b in problem.blocks
         for p in problem.recordings
@@ -151,17 +151,17 @@ def _lines(
     ]
     assert scanned.scan is not None
     low, high, _ = scanned.scan
-    return lines_of(there, low, high, _MOST_LINES)
+    return lines_of(series, low, high, _MOST_LINES)
 
 
 def lines_of(
-    found: Iterable[tuple[Residual, float]], low: float, high: float, most: int
+    series_given: Iterable[tuple[Residual, float]], low: float, high: float, most: int
 ) -> list[float]:
     """Frequencies at which the spectrum of residuals exceeds its surroundings most.
 
     Parameters
     ----------
-    found : iterable of (Residual, float)
+    series_given : iterable of (Residual, float)
         Residuals, each with its sampling interval [s].
     low, high : float
         Least and greatest frequency [Hz].
@@ -173,7 +173,7 @@ def lines_of(
     list of float
         The clearest first [Hz]; two are at least as far apart as the longest residual can tell.
     """
-    series = [(np.where(r.rows, r.value, 0.0) / r.noise, dt) for r, dt in found]
+    series = [(np.where(r.rows, r.value, 0.0) / r.noise, dt) for r, dt in series_given]
     if not series:
         return []
     longest = max(values.size * dt for values, dt in series)
@@ -184,14 +184,14 @@ def lines_of(
         return []
     power = sum((_power(values, dt, grid) for values, dt in series), np.zeros(grid.size))
     clear = power / np.maximum(_around(power), 1e-300)
-    found_at: list[int] = []
+    places: list[int] = []
     for k in np.argsort(-clear, kind="stable"):
         top = power[max(0, k - 1) : k + 2].max() == power[k]
-        if top and all(abs(int(k) - other) * step > 1.5 / longest for other in found_at):
-            found_at.append(int(k))
-        if len(found_at) == most:
+        if top and all(abs(int(k) - other) * step > 1.5 / longest for other in places):
+            places.append(int(k))
+        if len(places) == most:
             break
-    return [float(grid[k]) for k in found_at]
+    return [float(grid[k]) for k in places]
 
 
 def _power(values: Array, dt: float, grid: Array) -> Array:

@@ -85,7 +85,7 @@ def events_of(effect: Term, form: str = "") -> list[list[EffectParameter]]:
     return [list(one) for one in zip(*every, strict=True)]
 
 
-def _tried(parameter: EffectParameter) -> float:
+def _first_value(parameter: EffectParameter) -> float:
     """The value that a search over times gives a parameter."""
     return parameter.default if parameter.tried is None else parameter.tried
 
@@ -104,9 +104,9 @@ def _scale(effect: Term, parameter: str) -> float:
         "rise": _RISE_SCALE,
     }
     first = _first_of(effect, parameter)
-    usual = _FREQUENCY_SCALE if first.unit == "Hz" else _tried(effect.info.leading)
+    usual = _FREQUENCY_SCALE if first.unit == "Hz" else _first_value(effect.info.leading)
     if effect.info.own:
-        return _tried(first)
+        return _first_value(first)
     return scales.get(first.role, usual)
 
 
@@ -176,7 +176,8 @@ def _in_form(events: Events, form: str) -> Events:
     values = {}
     for name, event_values in events.values.items():
         parameters = {
-            p.name: event_values.get(p.name, _tried(p)) for p in effect.info.form(form).parameters
+            p.name: event_values.get(p.name, _first_value(p))
+            for p in effect.info.form(form).parameters
         }
         added = [
             p for event in events_of(effect, form) for p in event if p.name not in event_values
@@ -286,7 +287,7 @@ def _drifting(
         rows, _ = stacked(alone, of_recording, inflation)
         least = max(_LEAST_EVENT_GAIN, _EVENT_SHARE * float(rows @ rows))
         for shape in itertools.product(*shapes):
-            event = {leading.name: _tried(leading), **dict(shape)}
+            event = {leading.name: _first_value(leading), **dict(shape)}
             with_event = Events(effect, {name: event}, form).put_into(rig, name)
             moved, _ = stacked(alone, changes(alone, with_event, of_recording, effect), inflation)
             gain = _gain(rows, moved - rows, scaled=True)
@@ -309,7 +310,7 @@ def _scan(
 ) -> dict[str, float]:
     """Find where the events of one recording begin, the most telling first; empty without any."""
     slots = len(events_of(effect))
-    typical = _tried(effect.info.leading)
+    typical = _first_value(effect.info.leading)
     length = prepared.n * prepared.dt
     times = np.arange(_FIRST_TIME, length - _LAST_TIME, _SPACING)
     rows, _ = stacked(problem, base, inflation)
@@ -390,9 +391,9 @@ def _numbered(events: list[tuple[float, float]], effect: Term) -> dict[str, floa
     for (size, time), parameters in zip(events, events_of(effect), strict=False):
         for parameter in parameters:
             first = _first_of(effect, parameter.name)
-            by_role = {"time": time, "duration": _tried(first)}
+            by_role = {"time": time, "duration": _first_value(first)}
             values[parameter.name] = by_role.get(first.role, size)
-    return values | {p.name: _tried(p) for p in effect.info.with_role("rise") if values}
+    return values | {p.name: _first_value(p) for p in effect.info.with_role("rise") if values}
 
 
 def _fitted(

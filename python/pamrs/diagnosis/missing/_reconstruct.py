@@ -127,33 +127,39 @@ class _Windows:
         """Residual by bin [noise levels], usable samples and response, of some heights."""
         block, prepared = self.block, self.prepared
         if has_port(block):
-            left = residual(block, self.core, prepared, [], Input(self.spacing, heights))
-            value, response = left.value, left.response
+            block_residual = residual(block, self.core, prepared, [], Input(self.spacing, heights))
+            value, response = block_residual.value, block_residual.response
             assert response is not None  # an input was given
         else:
-            left, hats, which, response = self._reading
-            value = left.value - left.freed(np.sum(hats * heights[which], axis=1))
+            block_residual, hats, which, response = self._reading
+            value = block_residual.value - block_residual.freed(
+                np.sum(hats * heights[which], axis=1)
+            )
         width = bins_of(prepared)
-        means, counts = binned(value, left.rows, width)
-        return means / self.noise, counts, binned(response, left.rows, width)[0] / self.noise
+        means, counts = binned(value, block_residual.rows, width)
+        return (
+            means / self.noise,
+            counts,
+            binned(response, block_residual.rows, width)[0] / self.noise,
+        )
 
     @cached_property
     def _reading(self) -> tuple[Residual, Array, NDArray[np.intp], Array]:
         """The residual of a block whose reading errs, whatever the heights; hats of the knots of
         each sample's window (n, k), which knots these are, and what they do to the residual (n, k).
         """
-        left = residual(self.block, self.core, self.prepared, [])
-        hats, which = self._hats(left)
-        return left, hats, which, np.apply_along_axis(left.freed, 0, hats)
+        block_residual = residual(self.block, self.core, self.prepared, [])
+        hats, which = self._hats(block_residual)
+        return block_residual, hats, which, np.apply_along_axis(block_residual.freed, 0, hats)
 
-    def _hats(self, left: Residual) -> tuple[Array, NDArray[np.intp]]:
+    def _hats(self, block_residual: Residual) -> tuple[Array, NDArray[np.intp]]:
         """Error of a reading at each sample for each knot of its window (n, k), and which knots
         these are.
         """
         most = max(knots.stop - knots.start for knots in self.knots)
         hats, which = (
-            np.zeros((left.value.size, most)),
-            np.zeros((left.value.size, most), np.intp),
+            np.zeros((block_residual.value.size, most)),
+            np.zeros((block_residual.value.size, most), np.intp),
         )
         for a, b, knots in zip(self.starts, self.ends, self.knots, strict=True):
             count = knots.stop - knots.start

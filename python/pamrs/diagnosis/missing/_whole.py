@@ -39,9 +39,9 @@ def worst_block(problem: Problem, noise_level: Mapping[Key, NoiseLevel]) -> Bloc
 
     def missed(block: Block) -> float:
         means = [
-            means_in_noises(p, left, noise_level[block.name, p.recording.name])[1]
+            means_in_noises(p, block_residual, noise_level[block.name, p.recording.name])[1]
             for p in problem.recordings
-            for left in [residual(block, problem.core, p, [])]
+            for block_residual in [residual(block, problem.core, p, [])]
         ]
         every = np.concatenate(means)
         return float(np.mean(every**2)) if every.size else 0.0
@@ -111,7 +111,7 @@ def missing_input_of(
             )
     if not recorded:
         return None
-    return _told(block, recorded, parts, margin)
+    return _with_dependence(block, recorded, parts, margin)
 
 
 def _followed(
@@ -124,7 +124,7 @@ def _followed(
         return None
 
 
-def _told(
+def _with_dependence(
     block: Block, recorded: list[MissingRecording], parts: list[Reconstruction], margin: float
 ) -> MissingInput:
     """Missing input along all recordings, with words on what it depends on."""

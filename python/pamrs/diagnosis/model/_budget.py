@@ -70,7 +70,7 @@ class _Step:
 def budget(
     judged: list[Judged],
     problem: Problem,
-    left: Stages,
+    by_stage: Stages,
     noise_level: dict[Key, NoiseLevel],
     nominal: Rig,
     final: Rig,
@@ -89,7 +89,7 @@ def budget(
         The groups with their verdicts.
     problem : Problem
         Held-out recordings (those that were fitted, where there are no others).
-    left : dict of str to dict
+    by_stage : dict of str to dict
         Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
     noise_level : dict
         Noise by block and recording.
@@ -108,9 +108,9 @@ def budget(
     terms: list[BudgetTerm] = []
     best = owners_of_effects([one.chosen for one in judged])
     owners = {name: judged[k] for name, k in best.items() if name in judged[k].named}
-    bare = _without_held(problem, nominal, left["before"])
+    bare = _without_held(problem, nominal, by_stage["before"])
     for one in judged:
-        steps = _steps(one, problem, left, nominal, final, events)
+        steps = _steps(one, problem, by_stage, nominal, final, events)
         for block in one.group.blocks:
 
             def excess_of(residual: Residuals, block: Block = block) -> Excess:
@@ -146,7 +146,7 @@ class _Stage:
 def _steps(
     judged: Judged,
     problem: Problem,
-    left: Stages,
+    by_stage: Stages,
     nominal: Rig,
     final: Rig,
     events: Events | None,
@@ -154,17 +154,17 @@ def _steps(
     """The steps of a group after what the nominal model holds."""
     names = _in_order(judged)
     if not names:
-        refit = _Step("parameters", (), left["refit"])
+        refit = _Step("parameters", (), by_stage["refit"])
         if judged.verdict != "unlisted" or judged.group.closure is None:
             return [refit]
-        return [refit, _Step("form", (), left["after"])]
+        return [refit, _Step("form", (), by_stage["after"])]
     part = replace(problem, blocks=judged.group.blocks)
     known = known_parameters(nominal)
 
     @cache
     def with_terms(present: tuple[tuple[Term, ...], ...]) -> Residuals | None:
         if present == names:
-            return left["after"]
+            return by_stage["after"]
         happened = events if events is not None and (events.effect,) in present else None
         lacking = [term for terms in names if terms not in present for term in terms]
         rig = _without_terms(lacking, known, final)
@@ -173,11 +173,11 @@ def _steps(
         except SimulationError:  # without the others the model leaves its range
             return None
 
-    steps = [_Step("parameters", (), with_terms(()) or left["refit"])]
+    steps = [_Step("parameters", (), with_terms(()) or by_stage["refit"])]
     for n, terms in enumerate(names):
         now = with_terms(names[: n + 1]) or steps[-1].now
         without = with_terms((*names[:n], *names[n + 1 :])) if len(names) > 1 else None
-        change = _difference(left["after"], without) if without else None
+        change = _difference(by_stage["after"], without) if without else None
         kind = "effect" if terms[0].is_effect else "wrong_parameter"
         steps.append(_Step(kind, terms, now, change))
     return steps

@@ -250,8 +250,8 @@ def _sound_models(
         models = _models(nominal, fitted, judged, case_verdict(j.verdict for j in judged))
         inside = models.residuals(fitted)
         outside = inside if held is fitted else models.residuals(held)
-        problem, left = (fitted, inside) if held is fitted else (held, outside)
-        table = _table(problem, left, noise_level)
+        problem, by_stage = (fitted, inside) if held is fitted else (held, outside)
+        table = _table(problem, by_stage, noise_level)
         blamed = _blamed(models.judged, spoiled_channels(table)) | _needless(models, settings)
         blamed |= _worse_than_file(models.judged, table, settings.noise_margin - 1.0)
         missing = {k: _missed(j, table, errors) for k, j in enumerate(models.judged)}
@@ -539,7 +539,7 @@ def with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[s
 
 
 def _table(
-    problem: Problem, left: dict[str, dict[Key, Residual]], noise_level: dict[Key, NoiseLevel]
+    problem: Problem, by_stage: dict[str, dict[Key, Residual]], noise_level: dict[Key, NoiseLevel]
 ) -> dict[str, ChannelError]:
     """Error of every channel at every stage."""
     out = {}
@@ -549,13 +549,13 @@ def _table(
         for prepared in problem.recordings:
             noise.append(noise_level[block.name, prepared.recording.name].sample ** 2)
             weights.append(
-                max(1, int(left["refit"][block.name, prepared.recording.name].rows.sum()))
+                max(1, int(by_stage["refit"][block.name, prepared.recording.name].rows.sum()))
             )
         level = math.sqrt(float(np.average(noise, weights=weights)))
         for stage in ("before", "refit", "after"):
             squares = []
             for prepared in problem.recordings:
-                r = left[stage][block.name, prepared.recording.name]
+                r = by_stage[stage][block.name, prepared.recording.name]
                 squares.append(float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0)
             errors[stage] = math.sqrt(float(np.average(squares, weights=weights)))
         out[block.channel] = ChannelError(level, errors["before"], errors["refit"], errors["after"])

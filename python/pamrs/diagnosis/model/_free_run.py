@@ -69,7 +69,7 @@ _COMMANDS = ("valve_command", "supply_command", "pressure_command")
 
 def free_run(
     problem: Problem,
-    left: Stages,
+    by_stage: Stages,
     nominal: Rig,
     final: Rig,
     events: Events | None,
@@ -87,7 +87,7 @@ def free_run(
     ----------
     problem : Problem
         Held-out recordings (those that were fitted, where there are no others).
-    left : dict of str to dict
+    by_stage : dict of str to dict
         Residuals of the cut chain by stage (``before``, ``after``), block and recording.
     nominal, final : Rig
         The model of the rig file, and the one with what was found.
@@ -106,11 +106,13 @@ def free_run(
         the recording that the nominal model misses most, in noise levels, channel by channel.
     """
     runs, missing, curves, most = [], [], list[Trace](), -1.0
-    for prepared in (_with_starts(p, problem, left["after"]) for p in problem.recordings):
+    for prepared in (_with_starts(p, problem, by_stage["after"]) for p in problem.recordings):
         recording = prepared.recording
         try:
             model = final if events is None else events.put_into(final, recording.name)
-            run, drawn = _of(prepared, problem, left, nominal, model, noise_level or {})
+            run, drawn = _run_of_recording(
+                prepared, problem, by_stage, nominal, model, noise_level or {}
+            )
             runs.append(_judged(run, prepared, problem.blocks, model, known))
             missed = max((e.times_before for e in run.channels.values()), default=0.0)
             if missed > most:
@@ -122,16 +124,21 @@ def free_run(
     return runs, "without a free run: " + "; ".join(missing) if missing else "", curves
 
 
-def _with_starts(prepared: Prepared, problem: Problem, left: dict[Key, Residual]) -> Prepared:
+def _with_starts(
+    prepared: Prepared, problem: Problem, block_residuals: dict[Key, Residual]
+) -> Prepared:
     """A recording with the temperatures at which its gases began, as their blocks have them."""
-    starts = {b.channel: left[b.name, prepared.recording.name].temperature for b in problem.blocks}
+    starts = {
+        b.channel: block_residuals[b.name, prepared.recording.name].temperature
+        for b in problem.blocks
+    }
     return replace(prepared, temperatures={n: kelvin for n, kelvin in starts.items() if kelvin})
 
 
-def _of(
+def _run_of_recording(
     prepared: Prepared,
     problem: Problem,
-    left: Stages,
+    by_stage: Stages,
     nominal: Rig,
     final: Rig,
     noise_level: Mapping[Key, NoiseLevel],
@@ -152,7 +159,7 @@ def _of(
         block = covering.get(recorded_as(channel))
         if block is None:
             return None
-        residual = left[stage][block, recording.name]
+        residual = by_stage[stage][block, recording.name]
         values = residual.value[residual.rows]
         return math.sqrt(float(np.mean(values**2))) if values.size else None
 
@@ -208,7 +215,7 @@ def _judged(
         note = f"{note}; {part}" if note else part
     # drives bring noise into a block, and so into what its channel's error is compared with
     levels = {recorded_as(n): level for n in doubtful if (level := run.channels[n].noise)}
-    least = _left(prepared, logged, final, known, prepared.noise | levels)
+    least = _least_misses(prepared, logged, final, known, prepared.noise | levels)
     off = {n for n in doubtful if least.get(n, math.inf) > _OFF_NOISES}
     far = {recorded_as(name) for name in off}
     drives = {b.channel: far.intersection(b.drives) for b in blocks if b.mechanical}
@@ -221,7 +228,7 @@ def _judged(
     return replace(run, channels=channels, note=note)
 
 
-def _left(
+def _least_misses(
     prepared: Prepared,
     logged: Recording,
     final: Rig,
@@ -233,12 +240,12 @@ def _left(
 
     Steps of Gauss and Newton inside that distance, each tried by a simulation.
     """
-    starts, count = _begun(final, prepared), len(known.names)
+    starts, count = _gas_starts(final, prepared), len(known.names)
     compared = _compared(prepared, logged)
 
     def run(moved: Array) -> dict[str, Array]:
         values = dict(zip(known.names, known.values + known.root @ moved[:count], strict=True))
-        late = _late(logged, _OFF_LATE * float(moved[count]))
+        late = _with_late_commands(logged, _OFF_LATE * float(moved[count]))
         warm = zip(starts.items(), moved[count + 1 :].tolist(), strict=True)
         begins = {name: start.kelvin + start.unsure * away for (name, start), away in warm}
         start = with_known(final, values)
@@ -293,7 +300,7 @@ class _Begins(NamedTuple):
     unsure: float
 
 
-def _begun(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
+def _gas_starts(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
     """Temperature at which each gas with a balance of energy begins, by chamber: that of the room,
     but where its thermometer or its pressure clearly says otherwise.
     """
@@ -338,7 +345,7 @@ def _misses(
     return out
 
 
-def _late(recording: Recording, samples: float) -> Recording:
+def _with_late_commands(recording: Recording, samples: float) -> Recording:
     """A recording whose commands come some samples later (or earlier)."""
     if samples == 0.0:
         return recording
@@ -434,7 +441,7 @@ def _errors(
 ) -> tuple[dict[str, float], str, Simulation | None]:
     """Root mean square error of each measured channel, and why there is none; the simulation."""
     try:
-        begins = {name: begin.kelvin for name, begin in _begun(rig, prepared).items()}
+        begins = {name: begin.kelvin for name, begin in _gas_starts(rig, prepared).items()}
         run = replay(rig, logged, temperatures=begins, record=_measured(rig, logged))
         return differences(run, _compared(prepared, logged)), "", run
     except RecordingError:

@@ -42,12 +42,12 @@ def inflated(values: Array, rows: NDArray[np.bool_], width: int, noise: float) -
 
 
 def _inflations(
-    block: Block, recordings: list[Prepared], left: dict[Key, Residual], width: float
+    block: Block, recordings: list[Prepared], residuals: dict[Key, Residual], width: float
 ) -> dict[Key, float]:
     """Inflation (as of `inflated`) of a block in each recording that has a sample of it."""
     widths = {(block.name, p.recording.name): bin_width(p, width) for p in recordings}
     values = {
-        key: inflated(left[key].value, left[key].rows, count, left[key].noise)
+        key: inflated(residuals[key].value, residuals[key].rows, count, residuals[key].noise)
         for key, count in widths.items()
     }
     return {key: value for key, value in values.items() if value > 0.0}
@@ -60,19 +60,19 @@ def _most(values: dict[Key, float]) -> float:
 
 
 def inflation(
-    block: Block, recordings: list[Prepared], left: dict[Key, Residual], width: float
+    block: Block, recordings: list[Prepared], residuals: dict[Key, Residual], width: float
 ) -> float:
     """Variance of a block's bin means relative to white sample noise, times their correlation time
     (>= 1), without recordings that are far above the others.
     """
-    values = _inflations(block, recordings, left, width)
+    values = _inflations(block, recordings, residuals, width)
     usual = [value for value in values.values() if value <= _most(values)]
     return max(1.0, float(np.mean(usual))) if usual else 1.0
 
 
 def apart(
-    block: Block, recordings: list[Prepared], left: dict[Key, Residual], width: float
+    block: Block, recordings: list[Prepared], residuals: dict[Key, Residual], width: float
 ) -> dict[Key, float]:
     """Inflation of each recording in which it is far larger than in half of them."""
-    values = _inflations(block, recordings, left, width)
+    values = _inflations(block, recordings, residuals, width)
     return {key: value for key, value in values.items() if value > _most(values)}

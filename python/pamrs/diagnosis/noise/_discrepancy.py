@@ -161,7 +161,7 @@ def _size(stated: Stated, name: str, ranges: OperatingRanges) -> float:
 
 
 def _shares(stated: Stated, kinds: tuple[str, ...], name: str | None = None) -> float:
-    """The shares of some kinds of block together; of those with a name those called `name` alone."""
+    """The shares of some kinds of block together; of named ones those called `name` alone."""
     named = [n for n in stated if channel_of(n) in kinds]
     if name is not None:
         named = [n for n in named if block_of(n) in ("", name)]

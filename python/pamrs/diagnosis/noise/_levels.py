@@ -176,7 +176,8 @@ def noise_levels(
                     SimulationError
                 ):  # a realisation that leaves the model's range tells nothing of the others
                     disturbed = (
-                        change(block, core, _with_noise(prepared, noisy, rng), base) - base.value
+                        change(block, core, _with_more_noise(prepared, noisy, rng), base)
+                        - base.value
                         if noisy
                         else disturbed
                     )
@@ -217,18 +218,18 @@ def noise_levels(
 
 
 def means_in_noises(
-    prepared: Prepared, left: Residual, level: NoiseLevel
+    prepared: Prepared, block_residual: Residual, level: NoiseLevel
 ) -> tuple[NDArray[np.intp], Array]:
     """The bins of a recording that are usable (n,), and the means of a residual in them in units of
     their noise (n,); none where there is no noise.
     """
-    means, counts = binned(left.value, left.rows, bins_of(prepared))
+    means, counts = binned(block_residual.value, block_residual.rows, bins_of(prepared))
     usable = np.flatnonzero(counts if level.noise > 0.0 else ())
     return usable, means[usable] / level.noise if usable.size else np.empty(0)
 
 
 def error_sizes(
-    problem: Problem, left: dict[Key, Residual], noise_level: dict[Key, NoiseLevel]
+    problem: Problem, residuals: dict[Key, Residual], noise_level: dict[Key, NoiseLevel]
 ) -> tuple[dict[str, float], float]:
     """Most probable size of the model's error in each block, as a share of the usual one and at
     most 1, by what a hypothesis leaves; and the log evidence of these sizes.
@@ -241,7 +242,7 @@ def error_sizes(
     ----------
     problem : Problem
         Blocks and recordings.
-    left : dict
+    residuals : dict
         Residuals of the recordings.
     noise_level : dict
         From :func:`noise_levels`, with the curves of the usual error.
@@ -259,7 +260,7 @@ def error_sizes(
         for prepared in problem.recordings:
             key = block.name, prepared.recording.name
             level = noise_level[key]
-            usable, means = means_in_noises(prepared, left[key], level)
+            usable, means = means_in_noises(prepared, residuals[key], level)
             if level.curves is None or not means.size:
                 continue
             rows.append(means)
@@ -344,7 +345,9 @@ def _rounding(values: Array, step: float, rng: np.random.Generator) -> Array:
     return np.asarray(np.round(placed / step) * step - place - values, dtype=np.float64)
 
 
-def _with_noise(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) -> Prepared:
+def _with_more_noise(
+    prepared: Prepared, names: Iterable[str], rng: np.random.Generator
+) -> Prepared:
     """The recording with one more realisation of noise, as smoothed, on some drives."""
     signals = {}
     for name in names:
@@ -363,7 +366,7 @@ def _with_noise(prepared: Prepared, names: Iterable[str], rng: np.random.Generat
 def excess(
     block: Block,
     recordings: list[Prepared],
-    left: dict[Key, Residual],
+    residuals: dict[Key, Residual],
     noise_level: dict[Key, NoiseLevel],
     settings: DiagnosisSettings,
 ) -> Excess:
@@ -376,18 +379,18 @@ def excess(
     width = {p.recording.name: bins_of(p) for p in recordings}
     bins = {
         (key := (block.name, p.recording.name)): binned(
-            left[key].value, left[key].rows, width[p.recording.name]
+            residuals[key].value, residuals[key].rows, width[p.recording.name]
         )
         for p in recordings
     }
     whole = {key: noise_level[key] for key in bins}
-    against_all = _pooled(recordings, bins, left, whole, settings)
+    against_all = _pooled(recordings, bins, residuals, whole, settings)
     if all(level.curves is None for level in whole.values()):
         return against_all
     apart = {
         key: replace(level, binned=level.beside, stated=level.rest) for key, level in whole.items()
     }
-    beside = _pooled(recordings, _beside_curves(bins, apart), left, apart, settings)
+    beside = _pooled(recordings, _beside_curves(bins, apart), residuals, apart, settings)
     return max(against_all, beside, key=lambda e: e.ratio / e.limit)
 
 
@@ -419,7 +422,7 @@ def _beside_curves(bins: Bins, levels: dict[Key, NoiseLevel]) -> Bins:
 def _pooled(
     recordings: list[Prepared],
     bins: Bins,
-    left: dict[Key, Residual],
+    residuals: dict[Key, Residual],
     noise_level: dict[Key, NoiseLevel],
     settings: DiagnosisSettings,
 ) -> Excess:
@@ -428,7 +431,7 @@ def _pooled(
     ratios, weights, squares, noises, beyond_noise = [], [], [], [], []
     pieces: list[tuple[float, int]] = []
     for prepared, (key, (means, counts)) in zip(recordings, bins.items(), strict=True):
-        r = left[key]
+        r = residuals[key]
         length = max(1, round(PIECE_TIME / (bins_of(prepared) * prepared.dt)))
         variance = noise_level[key].binned ** 2
         for first in range(0, means.size, length):

@@ -73,10 +73,10 @@ def _tell_of_apart(problem: Problem, fitted: Fit, weights: Weights) -> None:
         )
 
 
-def _noise_levels(left: Residual) -> float:
+def _noise_levels(residual: Residual) -> float:
     """Root mean square of a residual in noise levels."""
-    count = max(1, int(left.rows.sum()))
-    return float(np.linalg.norm(left.value[left.rows])) / math.sqrt(count) / left.noise
+    count = max(1, int(residual.rows.sum()))
+    return float(np.linalg.norm(residual.value[residual.rows])) / math.sqrt(count) / residual.noise
 
 
 def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: Fit | None) -> Fit:
@@ -164,5 +164,7 @@ def _check_moved(problem: Problem, nominal: Rig, inflation: dict[str, float], fi
         )
 
 
-def _of(prepared: Prepared, left: dict[Key, Residual]) -> list[Residual]:
-    return [r for (_, recording), r in left.items() if recording == prepared.recording.name]
+def _of(prepared: Prepared, block_residuals: dict[Key, Residual]) -> list[Residual]:
+    return [
+        r for (_, recording), r in block_residuals.items() if recording == prepared.recording.name
+    ]

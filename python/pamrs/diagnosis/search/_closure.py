@@ -143,7 +143,9 @@ def find_closure(
     if first is None:
         return None
     autocorrelation = autocorrelation_of(problem, first, noise_level or {})
-    candidates, columns, warm = _again(problem, baseline, first, autocorrelation, blocks, closures)
+    candidates, columns, warm = _at_first_fit(
+        problem, baseline, first, autocorrelation, blocks, closures
+    )
     second = _select(
         _Stacked.of(problem, warm, first, autocorrelation), candidates, columns, first.values
     )
@@ -224,7 +226,7 @@ def _at_zero(
     return candidates, np.concatenate(columns, axis=1)
 
 
-def _again(
+def _at_first_fit(
     problem: Problem,
     baseline: Fit,
     fitted: Fit,

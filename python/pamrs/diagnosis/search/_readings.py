@@ -350,7 +350,7 @@ def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:
     used = list(
         dict.fromkeys(name for block in problem.blocks for name in (block.channel, *block.drives))
     )
-    units_said = {name: _said(problem, name) for name in used}
+    units_said = {name: _unit_said(problem, name) for name in used}
     sets = dict.fromkeys(
         [
             *((name,) for name in used),
@@ -377,7 +377,7 @@ def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:
             yield Reading(channels, "absolute", "gauge", same, ambient)
 
 
-def _said(problem: Problem, channel: str) -> str:
+def _unit_said(problem: Problem, channel: str) -> str:
     """The unit in which the log is said to have a channel; SI where it was read from none."""
     units = (p.recording.said.get(channel, "") for p in problem.recordings)
     unit = next((u for u in units if u), "")
