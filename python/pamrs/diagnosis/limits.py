@@ -130,16 +130,14 @@ def products_of(
     for prepared in problem.recordings:
         for block in problem.blocks:
             place = block, prepared.recording.name
-            free_baseline_residual = base[block.name, prepared.recording.name]
+            base_residual = base[block.name, prepared.recording.name]
             level = noise_level[block.name, prepared.recording.name]
             free = (
-                np.zeros((free_baseline_residual.value.size, 0))
-                if free_baseline_residual.jacobian is None
-                else free_baseline_residual.jacobian
+                np.zeros((base_residual.value.size, 0))
+                if base_residual.jacobian is None
+                else base_residual.jacobian
             )
-            means, counts = binned(
-                free * tolerances, free_baseline_residual.rows, bins_of(prepared)
-            )
+            means, counts = binned(free * tolerances, base_residual.rows, bins_of(prepared))
             curves = np.empty((means.shape[0], 0)) if level.curves is None else level.curves
             noise = level.noise * max(1.0, (left or {}).get(block.name, 1.0))
             share = counted(prepared, block, problem.settings) / max(1, int((counts > 0).sum()))
@@ -158,7 +156,7 @@ def products_of(
                 means, _ = binned(moved, base[key].rows, bins_of(prepared))
                 columns[block, prepared.recording.name][2][:, k] = means
     every = {place: weights[place] * np.hstack(parts) for place, parts in columns.items()}
-    return {place: own.T @ own for place, own in every.items()}
+    return {place: rows.T @ rows for place, rows in every.items()}
 
 
 def _freed(products: Array, count: int) -> Array:

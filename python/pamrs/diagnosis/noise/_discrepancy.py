@@ -58,20 +58,20 @@ def model_error(rig: Rig, usual: float) -> Stated:
     stated = rig.model_error
     if not usual:
         return stated
-    told = {channel_of(name) for name in stated}
+    stated_blocks = {channel_of(name) for name in stated}
     shares = dict.fromkeys(_IMPERFECT, usual) | dict.fromkeys(_GAUGES, _GAUGE_SHARE * usual)
-    return {n: {"share": s} for n, s in shares.items() if n not in told} | stated
+    return {n: {"share": s} for n, s in shares.items() if n not in stated_blocks} | stated
 
 
 def operating_ranges(block: Block, recordings: list[Prepared]) -> OperatingRanges:
     """Least value and width of each signal at a block, over all recordings [SI]."""
-    found = {}
+    ranges = {}
     for name in (block.channel, *block.drives):
-        there = [v for p in recordings if (v := _signal(p, name)) is not None]
-        if there:
-            low = min(float(v.min()) for v in there)
-            found[name] = low, max(max(float(v.max()) for v in there) - low, 1e-12)
-    return found
+        signals = [v for p in recordings if (v := _signal(p, name)) is not None]
+        if signals:
+            low = min(float(v.min()) for v in signals)
+            ranges[name] = low, max(max(float(v.max()) for v in signals) - low, 1e-12)
+    return ranges
 
 
 def curves(
@@ -172,13 +172,13 @@ def _flow_errors(block: Block, ranges: OperatingRanges, stated: Stated) -> list[
     """Signals over which errors of the flow into a block are curves, each with its share."""
     if block.kind not in _FLOWS or block.channel not in ranges:
         return []
-    own = block_of(block.channel)
+    name = block_of(block.channel)
     command = next((n for n in block.drives if channel_of(n) in _COMMANDS and n in ranges), None)
-    found = [
-        (block.channel, _shares(stated, _FLOWS[block.kind], own)),
-        (command or block.channel, _shares(stated, ("valve",), own)),
+    errors = [
+        (block.channel, _shares(stated, _FLOWS[block.kind], name)),
+        (command or block.channel, _shares(stated, ("valve",), name)),
     ]
-    return [(place, share) for place, share in found if share > 0.0]
+    return [(place, share) for place, share in errors if share > 0.0]
 
 
 def _drive_errors(
@@ -189,7 +189,7 @@ def _drive_errors(
     """
     around = (block.channel, *block.drives)
     motion = next((n for n in around if channel_of(n) in _MOTION and n in ranges), None)
-    found = []
+    drive_errors = []
     for name in block.drives:
         if name not in prepared.signals:
             continue
@@ -199,8 +199,8 @@ def _drive_errors(
             most = np.full_like(value, max(abs(low), abs(low + wide)))
             errors.append((motion or name, _shares(stated, _FACTORS), value))
             errors.append((motion or name, _shares(stated, _SUMMANDS), most))
-        found += [(name, place, size * much) for place, size, much in errors if size > 0.0]
-    return found
+        drive_errors += [(name, place, size * much) for place, size, much in errors if size > 0.0]
+    return drive_errors
 
 
 def _flowing(shares: Array, base: Residual) -> Array:

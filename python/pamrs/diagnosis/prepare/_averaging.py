@@ -58,16 +58,16 @@ def averaged_to_need(
     counts = [
         _odd(min(needed / r.sample_time, len(r) / settings.ample_samples)) for r in recordings
     ]
-    found = [averaged(r, count) for r, count in zip(recordings, counts, strict=True)]
-    total = sum(len(r) for r in found)
+    shortened = [averaged(r, count) for r, count in zip(recordings, counts, strict=True)]
+    total = sum(len(r) for r in shortened)
     if total > settings.most_samples:
-        longest = max(found, key=len)
+        longest = max(shortened, key=len)
         raise DiagnosisError(
             f"case {case!r}: its recordings have {total} samples at the rate that its blocks need; "
             f"at most {settings.most_samples} are diagnosed at a time: choose parts by start and "
             f"stop in case.toml (the longest is {longest.name!r}, {longest.duration:.4g} s)"
         )
-    return found, counts
+    return shortened, counts
 
 
 def _odd(ratio: float) -> int:

@@ -30,27 +30,27 @@ class Before(NamedTuple):
     samples: int
     moving: int
 
-    def commands(self, own: dict[str, Array], n: int) -> dict[str, Array]:
+    def commands(self, commands: dict[str, Array], n: int) -> dict[str, Array]:
         """Commands of a recording of `n` samples with those before it."""
         return {
             name: np.concatenate([np.full(self.samples * (values.size // n), values[0]), values])
-            for name, values in own.items()
+            for name, values in commands.items()
         }
 
     def signals(
-        self, own: dict[str, tuple[Array, Array]], prepared: Prepared
+        self, signals: dict[str, tuple[Array, Array]], prepared: Prepared
     ) -> dict[str, tuple[Array, Array]]:
         """Channels and their time derivatives with those before them."""
         back = prepared.dt * np.minimum(np.arange(self.samples, 0, -1), self.moving)
-        found = {}
-        for name, (value, slope) in own.items():
+        extended = {}
+        for name, (value, slope) in signals.items():
             first, rate = (float(array[0]) for array in prepared.begun(name, [0]))
             was = np.full(self.samples, first)
             if channel_of(name) in _PRESSURES:
                 was -= np.clip(rate * back, -_MOST_MOVED, _MOST_MOVED)
                 was = np.maximum(was, min(first, -_MOST_MOVED))
-            found[name] = (
+            extended[name] = (
                 np.concatenate([was, value]),
                 np.concatenate([np.gradient(was, prepared.dt), slope]),
             )
-        return found
+        return extended

@@ -93,9 +93,9 @@ def _unheard(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> di
     """Rows of each channel that show when a command changed in a hole, which nobody recorded: what
     is not measured behind it (a regulator's outlet, a spool, the flow in a tube) went on there.
     """
-    early, found = prepared.commanded_early(), dict[str, Mask]()
+    early, rows_of = prepared.commanded_early(), dict[str, Mask]()
     if early is None:
-        return found
+        return rows_of
     for block in blocks:
         try:
             apart = predicted(block, core, early) - predicted(block, core, prepared)
@@ -103,8 +103,8 @@ def _unheard(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> di
             continue  # the fit says what cannot be predicted
         shown = np.abs(apart) > _OUTLET_NOISES * prepared.noise[block.channel]
         if shown.any():
-            found[block.channel] = shown
-    return found
+            rows_of[block.channel] = shown
+    return rows_of
 
 
 def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances) -> bool:
@@ -113,12 +113,12 @@ def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolera
     A joint on its stop that is given a speed, by the noise of a few samples, bounces, and what a
     window is freed of is linear in where it starts.
     """
-    left = []
+    missed = []
     for channels in (frozenset[str](), frozenset({block.channel})):
-        there = replace(prepared, at_rest=channels, _begun={})
-        left.append(_left_at_first(block, core, there, tolerances))
-    seen, still = left
-    return seen - still > _STILL_DEVIATIONS**2
+        from_start = replace(prepared, at_rest=channels, _begun={})
+        missed.append(_left_at_first(block, core, from_start, tolerances))
+    from_speed, from_rest = missed
+    return from_speed - from_rest > _STILL_DEVIATIONS**2
 
 
 def _left_at_first(
@@ -132,14 +132,14 @@ def _left_at_first(
         return math.nan
     tol = np.array([tolerances[n] for n in names])
     try:
-        found = residual(block, core, prepared, names)
+        with_slopes = residual(block, core, prepared, names)
     except SimulationError:
         return math.nan
-    if found.jacobian is None or not found.starts or found.starts[0][0] > 0:
+    if with_slopes.jacobian is None or not with_slopes.starts or with_slopes.starts[0][0] > 0:
         return math.nan
-    last = found.starts[0][1]
-    slopes = np.vstack([found.jacobian[:last] * tol / found.noise, np.eye(tol.size)])
-    rows = np.concatenate([found.value[:last] / found.noise, np.zeros(tol.size)])
+    last = with_slopes.starts[0][1]
+    slopes = np.vstack([with_slopes.jacobian[:last] * tol / with_slopes.noise, np.eye(tol.size)])
+    rows = np.concatenate([with_slopes.value[:last] / with_slopes.noise, np.zeros(tol.size)])
     rows = rows - slopes @ np.linalg.lstsq(slopes, rows)[0]
     return float(rows @ rows)
 
@@ -169,8 +169,8 @@ class _Beginnings:
     def _last(self, block: Block, apart: Array) -> int:
         """Samples up to the last one at which two predictions can be told apart."""
         most = _OUTLET_NOISES * self.prepared.noise[block.channel]
-        seen = np.flatnonzero(np.abs(apart) > most)
-        return int(seen[-1]) + 1 if seen.size else 0
+        shown = np.flatnonzero(np.abs(apart) > most)
+        return int(shown[-1]) + 1 if shown.size else 0
 
     def _by_outlets(self, block: Block) -> Array:
         """Change of a prediction if regulators begin at their set pressures."""
@@ -217,11 +217,13 @@ class _Beginnings:
         """
         early = int(_SILENT_DELAYS * tube.delay / self.prepared.dt)
         ends = [name for name in (tube.end, tube.beginning) if name in self.at]
-        tells = [told for name in ends if (told := self._tells(name, early)) is not None]
-        if tube.end not in ends or len(tells) < len(ends):
+        evidences = [
+            evidence for name in ends if (evidence := self._tells(name, early)) is not None
+        ]
+        if tube.end not in ends or len(evidences) < len(ends):
             return False
-        fits, _ = tells[0]
-        likely = [more for _, more in tells]
+        fits, _ = evidences[0]
+        likely = [more for _, more in evidences]
         least = math.log(_REST_LIKELIHOOD)
         return fits and min(likely) > least
 
@@ -235,8 +237,8 @@ class _Beginnings:
         read = self.prepared.recording.channels[channel][:early][rows]
 
         def missed(moving: bool) -> float:
-            left = read - self._from(self.at[channel], moving=moving)[:early][rows]
-            return float(np.var(left)) * left.size / self.prepared.noise[channel] ** 2
+            rest = read - self._from(self.at[channel], moving=moving)[:early][rows]
+            return float(np.var(rest)) * rest.size / self.prepared.noise[channel] ** 2
 
         rest, freedom = missed(False), read.size - 1
         return rest < freedom + 3.0 * math.sqrt(2.0 * freedom), 0.5 * (missed(True) - rest)
@@ -263,20 +265,20 @@ def _set(block: Block) -> list[str]:
 
 def _unmeasured(block: Block) -> str:
     """Words on what nobody measured in a block, and on what would measure it."""
-    told = []
+    reasons = []
     if _set(block) and block.beside:
         gauges = [dotted("supply_pressure", block_of(name)) for name in _set(block)]
-        told.append(
+        reasons.append(
             "they show where the regulator began, and nobody measured that (a gauge for "
             f"{' or '.join(gauges)} would)"
         )
     if block.tubes:
         tubes = " and ".join(tube.name for tube in block.tubes)
-        told.append(
+        reasons.append(
             f"they show what flowed through {tubes} before, and nobody measured that (a recording "
             "that begins at rest needs not know)"
         )
-    return ", or ".join(told)
+    return ", or ".join(reasons)
 
 
 def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
@@ -294,31 +296,31 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
     list of str
         A sentence for each block.
     """
-    said = []
+    notes = []
     each = {p.recording.name: p for p in recordings}.values()
     for block in blocks:
-        own = [p for p in each if p.unsettled.get(block.channel)]
-        if own:
-            told = ", ".join(
-                f"{p.unsettled[block.channel] * p.dt:.3g} s of {p.recording.name}" for p in own
+        having = [p for p in each if p.unsettled.get(block.channel)]
+        if having:
+            times = ", ".join(
+                f"{p.unsettled[block.channel] * p.dt:.3g} s of {p.recording.name}" for p in having
             )
-            said.append(
-                f"block {block.name}: the first {told} were not judged: {_unmeasured(block)}"
+            notes.append(
+                f"block {block.name}: the first {times} were not judged: {_unmeasured(block)}"
             )
         heard = [(p, p.unheard[block.channel].sum()) for p in each if block.channel in p.unheard]
         if heard:
-            told = ", ".join(f"{count * p.dt:.3g} s of {p.recording.name}" for p, count in heard)
-            said.append(
-                f"block {block.name}: {told} were not judged: a command changed in a hole of the "
+            times = ", ".join(f"{count * p.dt:.3g} s of {p.recording.name}" for p, count in heard)
+            notes.append(
+                f"block {block.name}: {times} were not judged: a command changed in a hole of the "
                 "log, and nobody recorded when"
             )
-    return said
+    return notes
 
 
 def said_of_warm_starts(
     blocks: Sequence[Block],
     recordings: Sequence[Prepared],
-    found: Mapping[tuple[str, str], Residual],
+    residuals: Mapping[tuple[str, str], Residual],
 ) -> list[str]:
     """Gases that began clearly warmer or colder than the room, in words: a sentence for each block.
 
@@ -328,21 +330,21 @@ def said_of_warm_starts(
         Those that are judged.
     recordings : sequence of Prepared
         Those of a case; one that is there twice counts once.
-    found : mapping
+    residuals : mapping
         Residuals of the final model, by block and recording.
     """
-    said = []
+    notes = []
     for block in blocks:
         away = {
             p.recording.name: (kelvin - block.warm.room, p.settings.begun_temperature_error)
             for p in recordings
-            if (kelvin := found[block.name, p.recording.name].temperature) is not None
+            if (kelvin := residuals[block.name, p.recording.name].temperature) is not None
             and block.warm is not None
         }
         clear = [f"{k:+.0f} K in {name}" for name, (k, least) in away.items() if abs(k) > least]
         if clear:
-            said.append(
+            notes.append(
                 f"block {block.name}: recordings begin in a transient; the temperature of the gas "
                 f"there is fitted, and differs from the room's by about {', '.join(clear)}"
             )
-    return said
+    return notes

@@ -810,8 +810,8 @@ def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tupl
         if n == block.thermometer
         or (channel_of(n) in DRIVES and (channel_of(n) != "line_pressure" or n in around))
     }
-    own = {name: prepared.begun(name, starts) for name in state if name in drives}
-    return drives | own | _warm(block, prepared)
+    at_starts = {name: prepared.begun(name, starts) for name in state if name in drives}
+    return drives | at_starts | _warm(block, prepared)
 
 
 def _warm(block: Block, prepared: Prepared) -> dict[str, tuple[Array, Array]]:
@@ -824,14 +824,14 @@ def _warm(block: Block, prepared: Prepared) -> dict[str, tuple[Array, Array]]:
 
 def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
     """A compiled rig with the values that it had in a recording."""
-    own = prepared.recording.parameters
-    if not own:
+    values = prepared.recording.parameters
+    if not values:
         return core
     known = dict(zip(core.parameter_names, core.values.tolist(), strict=True))
-    there = core.revalued({n: value.at(known[n]) for n, value in own.items() if n in known})
-    if there is None:
+    revalued = core.revalued({n: value.at(known[n]) for n, value in values.items() if n in known})
+    if revalued is None:
         raise AssertionError("values of a recording are those of parameters that can vary")
-    return there
+    return revalued
 
 
 def predicted(
@@ -869,7 +869,7 @@ def predicted(
     if before is not None:
         lead = before.samples
         commands = before.commands(commands, prepared.n)
-        measured = {name: own for name, own in signals.items() if name in prepared.signals}
+        measured = {name: signal for name, signal in signals.items() if name in prepared.signals}
         signals = before.signals(measured, prepared)
         # what is measured starts anew at every sample of it
         starts = [*range(lead), *(lead + start for start in starts)]
@@ -909,8 +909,8 @@ def _shown(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
         return start
     noise, settings = prepared.noise[block.channel], prepared.settings
     with np.errstate(over="ignore"):  # of a model that ran away, which no fit keeps
-        told = float(np.linalg.norm(start[:, -1])) * settings.begun_temperature_error > noise
-    return start if told else start[:, :-1]
+        remembered = float(np.linalg.norm(start[:, -1])) * settings.begun_temperature_error > noise
+    return start if remembered else start[:, :-1]
 
 
 @dataclass(frozen=True)
@@ -939,9 +939,9 @@ class _GasStart:
             block.channel,
             *(n for n in block.drives if channel_of(n) == "supply_pressure"),
         ]
-        there = [prepared.signals[n][0] for n in pressures if n in prepared.signals]
-        first = float(there[0][0])
-        bounds = block.warm.range_at(first, max(float(v.max()) for v in there))
+        gauges = [prepared.signals[n][0] for n in pressures if n in prepared.signals]
+        first = float(gauges[0][0])
+        bounds = block.warm.range_at(first, max(float(v.max()) for v in gauges))
         wide = (bounds[1] - bounds[0]) / _START_DEVIATIONS
         least = prepared.settings.begun_temperature_error
         return cls(block.warm.room, *bounds, max(wide, least))
@@ -978,18 +978,24 @@ def _freed_window(
     if not (0.0 < length < math.inf and math.isfinite(float(value @ value))):
         return _FreedWindow(q, taken, begins)  # of a model that ran away
     way, held = column / length, (noise / gas.std) ** 2
-    there = float(way @ (value - taken))
-    seen = there + length * (begins - gas.room)  # in the residual, from the room's temperature
-    wanted = gas.room + length * seen / (length**2 + held)
-    found = min(max(wanted, gas.coldest), gas.warmest)
-    past = seen - length * (found - gas.room)
-    left = math.copysign(math.hypot(past, (found - gas.room) * noise / gas.std), seen)
+    along = float(way @ (value - taken))
+    from_room = along + length * (begins - gas.room)  # in the residual, from the room's temperature
+    wanted = gas.room + length * from_room / (length**2 + held)
+    temperature = min(max(wanted, gas.coldest), gas.warmest)
+    past = from_room - length * (temperature - gas.room)
+    kept_in_residual = math.copysign(
+        math.hypot(past, (temperature - gas.room) * noise / gas.std), from_room
+    )
     # how fast what is left grows with the residual
-    grows = past / left if left and found != wanted else held / (length**2 + held)
-    grows = grows if found != wanted else math.sqrt(held / (length**2 + held))
+    grows = (
+        past / kept_in_residual
+        if kept_in_residual and temperature != wanted
+        else held / (length**2 + held)
+    )
+    grows = grows if temperature != wanted else math.sqrt(held / (length**2 + held))
     basis = np.column_stack([q, math.sqrt(max(0.0, 1.0 - grows)) * way])
-    strain = ((found - gas.room) / gas.std) ** 2
-    return _FreedWindow(basis, taken + (there - left) * way, found, strain)
+    strain = ((temperature - gas.room) / gas.std) ** 2
+    return _FreedWindow(basis, taken + (along - kept_in_residual) * way, temperature, strain)
 
 
 def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array) -> list[Array]:
@@ -1004,8 +1010,8 @@ def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array
         # how far it falls goes with the valve's area over the tank's volume, which nobody knows
         for off, steeper in ((np.ones_like(value), 0.0), (value - value[0], 1.0)):
             step = 1e-3 * max(1.0, float(np.abs(value).max())) / max(1.0, float(np.abs(off).max()))
-            there = prepared.shaken({name: (value + step * off, slope * (1.0 + step * steeper))})
-            bare = replace(there, recording=replace(there.recording, parameters={}))
+            moved = prepared.shaken({name: (value + step * off, slope * (1.0 + step * steeper))})
+            bare = replace(moved, recording=replace(moved.recording, parameters={}))
             columns.append((predicted(block, core, bare) - prediction) / step)
     return columns
 
@@ -1014,17 +1020,17 @@ def _beside_starts(columns: list[Array], starts: list[tuple[int, int, Array]]) -
     """Orthonormal columns (n, k) that are free in a whole recording, without what the starts of its
     windows can do.
     """
-    kept, rounding = [], float(np.finfo(np.float64).eps) ** 0.5
+    free, rounding = [], float(np.finfo(np.float64).eps) ** 0.5
     for column in columns:
         whole = float(np.linalg.norm(column))
         for a, b, q in starts:
             column[a:b] -= q @ (q.T @ column[a:b])
-        left = float(np.linalg.norm(column))
-        if left > rounding * whole:
-            kept.append(column / left)
-    if not kept:
+        length = float(np.linalg.norm(column))
+        if length > rounding * whole:
+            free.append(column / length)
+    if not free:
         return np.zeros((0, 0))
-    basis, triangle = np.linalg.qr(np.array(kept).T)
+    basis, triangle = np.linalg.qr(np.array(free).T)
     return np.asarray(basis[:, np.abs(np.diag(triangle)) > rounding])
 
 
@@ -1071,15 +1077,15 @@ def _from_its_start(
     a prior say (Gauss-Newton), and the recording with that temperature.
     """
     gas = _GasStart.of(block, prepared)
-    found = _with_slopes(block, core, prepared, starts, names, given)
+    with_slopes = _with_slopes(block, core, prepared, starts, names, given)
     if gas is None:
-        return prepared, *found
+        return prepared, *with_slopes
     first = slice(starts[0], [*starts[1:], prepared.n][0])
     rows = prepared.usable(block.channel, block.drives, starts)[first]
     measured = np.where(rows, prepared.recording.channels[block.channel][first], 0.0)
     begins = gas.room
     for _ in range(_START_STEPS):
-        prediction, jacobian, _ = found
+        prediction, jacobian, _ = with_slopes
         start = np.where(rows[:, None], jacobian[first, len(names) :], 0.0)
         columns = _shown(block, start, starts[0], prepared)
         value = np.where(rows, measured - prediction[first], 0.0)
@@ -1090,8 +1096,8 @@ def _from_its_start(
             break  # so far it is linear
         begins = wanted
         prepared = replace(prepared, temperatures={block.channel: begins})
-        found = _with_slopes(block, core, prepared, starts, names, given)
-    return prepared, *found
+        with_slopes = _with_slopes(block, core, prepared, starts, names, given)
+    return prepared, *with_slopes
 
 
 def residual(
@@ -1121,8 +1127,8 @@ def residual(
     # without parameters a free null direction is still wanted for the window's start: ask for one
     # parameter
     given_own = [n for n, v in prepared.recording.parameters.items() if v.error == "own"]
-    own = [n for n in given_own if n in core.parameter_names]
-    names = list(dict.fromkeys([*parameters, *own])) or [
+    own_free = [n for n in given_own if n in core.parameter_names]
+    names = list(dict.fromkeys([*parameters, *own_free])) or [
         next(
             (n for n in core.parameter_names if n.endswith("pressure_zero")),
             core.parameter_names[0],
@@ -1131,33 +1137,33 @@ def residual(
     prepared, prediction, jacobian, response = _from_its_start(
         block, core, prepared, starts, names, given
     )
-    free = jacobian[:, [names.index(n) for n in own]].T.copy()
-    for name, there in prepared.recording.parameters.items():
+    free = jacobian[:, [names.index(n) for n in own_free]].T.copy()
+    for name, value_of in prepared.recording.parameters.items():
         if name in parameters:
-            jacobian[:, names.index(name)] *= there.slope
+            jacobian[:, names.index(name)] *= value_of.slope
     rows = prepared.usable(block.channel, block.drives, starts)
     measured = prepared.recording.channels[block.channel]
     value = np.where(rows, measured - prediction, 0.0)
     slopes = np.where(rows[:, None], np.hstack([jacobian[:, : len(names)], response]), 0.0)
     columns = np.where(rows[:, None], jacobian[:, len(names) :], 0.0)
-    left = Residual(value, None, prediction, rows, prepared.noise[block.channel])
-    found = _freed_of_starts(block, prepared, left, starts, columns, slopes)
+    not_freed = Residual(value, None, prediction, rows, prepared.noise[block.channel])
+    freed = _freed_of_starts(block, prepared, not_freed, starts, columns, slopes)
     every = [*_levels(block, core, prepared, prediction), *free]
-    of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], found.starts)
+    of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], freed.starts)
     if of_recording.size:
-        taken = of_recording @ (of_recording.T @ found.value)
+        taken = of_recording @ (of_recording.T @ freed.value)
         slopes -= of_recording @ (of_recording.T @ slopes)
-        found = replace(
-            found,
-            value=found.value - taken,
-            prediction=found.prediction + taken,
-            starts=[*found.starts, (0, prepared.n, of_recording)],
+        freed = replace(
+            freed,
+            value=freed.value - taken,
+            prediction=freed.prediction + taken,
+            starts=[*freed.starts, (0, prepared.n, of_recording)],
         )
     return replace(
-        found,
+        freed,
         jacobian=slopes[:, : len(parameters)] if parameters else None,
         # a whole recording is shown from its measured start, a window from the one that suits best
-        prediction=prediction if block.window is None else found.prediction,
+        prediction=prediction if block.window is None else freed.prediction,
         response=None if given is None else slopes[:, len(names) :],
     )
 
@@ -1165,7 +1171,7 @@ def residual(
 def _freed_of_starts(
     block: Block,
     prepared: Prepared,
-    left: Residual,
+    not_freed: Residual,
     starts: list[int],
     columns: Array,
     slopes: Array,
@@ -1173,7 +1179,7 @@ def _freed_of_starts(
     """A residual freed of where its windows start, and so are `slopes` (n, k), in place; windows
     with too few rows are left out. ``columns`` are what the start of each window does.
     """
-    value, rows, shifted = left.value, left.rows, left.prediction.copy()
+    value, rows, shifted = not_freed.value, not_freed.rows, not_freed.prediction.copy()
     gas = _GasStart.of(block, prepared)
     begins = prepared.temperatures.get(block.channel, gas.room) if gas else 0.0
     temperature, strain = (begins if gas else None), 0.0
@@ -1183,12 +1189,14 @@ def _freed_of_starts(
         if np.count_nonzero(rows[a:b]) < WINDOW_SAMPLES_PER_STATE * start.shape[1]:
             rows[a:b], value[a:b], slopes[a:b] = False, 0.0, 0.0
             continue
-        own = gas if a == starts[0] and start.shape[1] > 1 else None
-        freed = _freed_window(start, value[a:b], left.noise, own, begins)
+        first_gas = gas if a == starts[0] and start.shape[1] > 1 else None
+        freed = _freed_window(start, value[a:b], not_freed.noise, first_gas, begins)
         bases.append((a, b, freed.basis))
         value[a:b] -= freed.taken
         shifted[a:b] += freed.taken
         slopes[a:b] -= freed.basis @ (freed.basis.T @ slopes[a:b])
         strain += freed.strain
         temperature = freed.begins or temperature
-    return replace(left, prediction=shifted, starts=bases, temperature=temperature, strain=strain)
+    return replace(
+        not_freed, prediction=shifted, starts=bases, temperature=temperature, strain=strain
+    )

@@ -47,10 +47,14 @@ def own_of_rig(rig: Rig, recordings: Sequence[Recording]) -> list[Recording]:
         As they were read.
     """
     nominal = {name: _nominal(rig, name) for name in rig.own}
-    left = {_core_name(rig, n): OwnValue(value, value, "own") for n, value in nominal.items()}
+    nominal_values = {
+        _core_name(rig, n): OwnValue(value, value, "own") for n, value in nominal.items()
+    }
     return [
-        replace(r, parameters=left | {_core_name(rig, n): v for n, v in r.parameters.items()})
-        if left or r.parameters
+        replace(
+            r, parameters=nominal_values | {_core_name(rig, n): v for n, v in r.parameters.items()}
+        )
+        if nominal_values or r.parameters
         else r
         for r in recordings
     ]
@@ -60,16 +64,16 @@ def _core_name(rig: Rig, name: str) -> str:
     """A parameter as the core has it: of an effect that is the only one of its id, without the
     block at which it acts.
     """
-    found = effect_parameter(rig, name)
-    return name if found is None else ".".join(found[:2])
+    parameter = effect_parameter(rig, name)
+    return name if parameter is None else ".".join(parameter[:2])
 
 
 def _nominal(rig: Rig, name: str) -> float:
     """Value in the rig file of one of its parameters, or of a parameter of one of its effects."""
-    found = effect_parameter(rig, name)
-    if found is None:
+    parameter = effect_parameter(rig, name)
+    if parameter is None:
         return rig.parameter(name).value
-    _, short, entry = found
+    _, short, entry = parameter
     return float(entry["parameters"][short])
 
 
@@ -98,36 +102,40 @@ def with_own_values(
     tanks : sequence of str
         Channels of tanks without a gauge.
     """
-    own = {n: v for n, v in prepared.recording.parameters.items() if v.error == "own"}
-    begun = {begins_at(tank): tank for tank in tanks if begins_at(tank) in own}
-    free = [name for name in own if name in core.parameter_names]
-    every = [*free, *begun]
+    own_values = {n: v for n, v in prepared.recording.parameters.items() if v.error == "own"}
+    tank_of = {begins_at(tank): tank for tank in tanks if begins_at(tank) in own_values}
+    free = [name for name in own_values if name in core.parameter_names]
+    every = [*free, *tank_of]
     if not every:
         return prepared
-    seen = [
-        replace(b, floating=tuple(tank for tank in b.floating if tank not in begun.values()))
+    dependent = [
+        replace(b, floating=tuple(tank for tank in b.floating if tank not in tank_of.values()))
         for b in blocks
     ]
 
     def at(values: Array) -> Prepared:
-        put = {n: replace(own[n], value=float(v)) for n, v in zip(every, values, strict=True)}
+        put = {
+            n: replace(own_values[n], value=float(v)) for n, v in zip(every, values, strict=True)
+        }
         parameters = prepared.recording.parameters | put
-        there = replace(prepared, recording=replace(prepared.recording, parameters=parameters))
-        return with_tanks(rig, core, there, tanks)
+        with_values = replace(
+            prepared, recording=replace(prepared.recording, parameters=parameters)
+        )
+        return with_tanks(rig, core, with_values, tanks)
 
     def rows_at(values: Array, names: list[str]) -> tuple[Array, Array]:
-        there = at(values)
+        with_values = at(values)
         fixed = {
-            n: replace(v, error="same") if n in own else v
-            for n, v in there.recording.parameters.items()
+            n: replace(v, error="same") if n in own_values else v
+            for n, v in with_values.recording.parameters.items()
         }
-        told = replace(there, recording=replace(there.recording, parameters=fixed))
-        found = [residual(block, core, told, names) for block in seen]
-        slopes = [r.jacobian / r.noise for r in found if r.jacobian is not None]
-        rows = np.concatenate([r.value / r.noise for r in found])
+        held = replace(with_values, recording=replace(with_values.recording, parameters=fixed))
+        block_residuals = [residual(block, core, held, names) for block in dependent]
+        slopes = [r.jacobian / r.noise for r in block_residuals if r.jacobian is not None]
+        rows = np.concatenate([r.value / r.noise for r in block_residuals])
         return rows, np.concatenate(slopes) if slopes else np.zeros((rows.size, 0))
 
-    def left(values: Array) -> tuple[float, Array, Array]:
+    def misfit(values: Array) -> tuple[float, Array, Array]:
         rows, slopes = rows_at(values, free)
         moved = []
         for k in range(len(free), values.size):
@@ -136,9 +144,9 @@ def with_own_values(
             moved.append((rows - shaken) / step)
         return float(rows @ rows), rows, np.column_stack([slopes, *moved])
 
-    values = np.array([own[name].value for name in every])
+    values = np.array([own_values[name].value for name in every])
     try:
-        size, rows, slopes = left(values)
+        size, rows, slopes = misfit(values)
     except SimulationError:
         return prepared  # the fit says what cannot be predicted
     for _ in range(_OWN_STEPS):
@@ -148,7 +156,7 @@ def with_own_values(
         wanted = values + step
         wanted = np.where(values > 0.0, np.clip(wanted, values / 3.0, values * 3.0), wanted)
         try:
-            now, more_rows, more_slopes = left(wanted)
+            now, more_rows, more_slopes = misfit(wanted)
         except SimulationError:
             break
         if not now < size:
@@ -162,23 +170,23 @@ def with_own_values(
 
 def said_of_own(recordings: Sequence[Prepared]) -> list[str]:
     """Values that recordings have of their own, in words, and how far they are from each other."""
-    found: dict[str, dict[str, float]] = {}
-    said = []
+    values_of: dict[str, dict[str, float]] = {}
+    notes = []
     simulated = {begins_at(tank) for p in recordings for tank in p.simulated}
     for name, recording in {p.recording.name: p.recording for p in recordings}.items():
-        for parameter, own in recording.parameters.items():
-            if own.error == "own":
-                found.setdefault(parameter, {})[name] = own.value
-    for parameter in [n for n in found if n.endswith(f".{_BEGINS}") and n not in simulated]:
-        said.append(f"{parameter}: its gauge says where each recording begins")
-        del found[parameter]
-    for parameter, values in found.items():
+        for parameter, value in recording.parameters.items():
+            if value.error == "own":
+                values_of.setdefault(parameter, {})[name] = value.value
+    for parameter in [n for n in values_of if n.endswith(f".{_BEGINS}") and n not in simulated]:
+        notes.append(f"{parameter}: its gauge says where each recording begins")
+        del values_of[parameter]
+    for parameter, values in values_of.items():
         low, high = min(values.values()), max(values.values())
-        told = ", ".join(f"{format_number(v, unicode=False)} in {n}" for n, v in values.items())
+        listed = ", ".join(f"{format_number(v, unicode=False)} in {n}" for n, v in values.items())
         apart = (
             f"; the largest is {high / low:.2g} times the smallest"
             if low > 0.0 and high / low > _OWN_APART
             else ""
         )
-        said.append(f"{parameter} is free in each recording: {told} (SI){apart}")
-    return said
+        notes.append(f"{parameter} is free in each recording: {listed} (SI){apart}")
+    return notes

@@ -103,22 +103,24 @@ def check_plausible(
     DiagnosisError
         With every finding: recording, channel, what was found, what is allowed.
     """
-    found = [
+    findings = [
         f"recording {r.name!r}: {text}"
         for r in recordings
         for text in implausible(r, rig, settings)
     ]
-    _refuse(case, found)
+    _refuse(case, findings)
 
 
-def _refuse(case: str, found: list[str]) -> None:
-    if not found:
+def _refuse(case: str, findings: list[str]) -> None:
+    if not findings:
         return
-    told = found[:_MOST_ITEMS] + (
-        [f"and {len(found) - _MOST_ITEMS} more of this kind"] if len(found) > _MOST_ITEMS else []
+    lines = findings[:_MOST_ITEMS] + (
+        [f"and {len(findings) - _MOST_ITEMS} more of this kind"]
+        if len(findings) > _MOST_ITEMS
+        else []
     )
     raise DiagnosisError(
-        joined(f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", told)
+        joined(f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", lines)
     )
 
 
@@ -172,11 +174,11 @@ def without_impossible(
     Returns
     -------
     recordings : list of Recording
-    said : list of str
+    notes : list of str
         A line for each channel of each recording with such samples: how many, and when.
     """
     limits = {m.channel: (m.low - m.margin, m.high + m.margin) for m in _moving(rig, settings)}
-    found, said = [], []
+    masked, notes = [], []
     for recording in recordings:
         mask = dict(recording.mask)
         channels = dict(recording.channels)
@@ -192,13 +194,13 @@ def without_impossible(
                 mask[name] = mask[name] & ~bad
                 channels[name] = np.where(bad, np.nan, channels[name])
                 where = recording.source or recording.name
-                said.append(
+                notes.append(
                     f"{recording.name}: {int(bad.sum())} samples of {name} in {where} are beyond "
                     f"the possible ({_told(recording, name, low, high)}) and were masked: "
                     f"{_when(bad, recording)}"
                 )
-        found.append(replace(recording, mask=mask, channels=channels))
-    return found, said
+        masked.append(replace(recording, mask=mask, channels=channels))
+    return masked, notes
 
 
 def _lost(
@@ -235,11 +237,11 @@ def _lost(
 def _when(bad: Mask, recording: Recording) -> str:
     """The first stretches in which something is, in seconds."""
     pairs = stretches(bad)
-    told = [
+    spans = [
         f"{recording.time[a]:.4g} to {recording.time[b - 1]:.4g} s" for a, b in pairs[:_MOST_ITEMS]
     ]
     more = f" and {len(pairs) - _MOST_ITEMS} more stretches" if len(pairs) > _MOST_ITEMS else ""
-    return ", ".join(told) + more
+    return ", ".join(spans) + more
 
 
 def _told(recording: Recording, name: str, *values: float, digits: str = ".3g") -> str:
@@ -268,9 +270,9 @@ def _clock(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Itera
 def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
     """Findings on sizes of pressures, alone and against the rig file or a regulator's command."""
     rated = {
-        dotted("supply_pressure", supply): told
+        dotted("supply_pressure", supply): set_to
         for supply in rig.tables("supply")
-        if (told := _set_to(recording, rig, supply)) is not None
+        if (set_to := _set_to(recording, rig, supply)) is not None
     }
     largest = max(
         [
@@ -326,8 +328,8 @@ def _in_front(recording: Recording, rig: Rig, supply: str) -> float:
     if not inlet:
         return math.inf
     known = _values(recording, dotted("supply_pressure", inlet))
-    told = float(rig.tables("supply")[inlet]["initial_pressure"])
-    return max(0.0, float(known.min())) if known.size else told
+    stated = float(rig.tables("supply")[inlet]["initial_pressure"])
+    return max(0.0, float(known.min())) if known.size else stated
 
 
 def _set_to(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | None:
@@ -375,18 +377,20 @@ def fed_by(rig: Rig) -> dict[str, list[str]]:
     ports = {block: rig.ports(block) for block in ("valve", "line")}
     into = [(e["from"], e["to"]) for block in ports.values() for e in block.values() if e["from"]]
     inlets = {dotted("line", name): e["to"] for name, e in ports["line"].items()}
-    found: dict[str, list[str]] = {name: [] for name in rig.tables("chamber")}
+    suppliers: dict[str, list[str]] = {name: [] for name in rig.tables("chamber")}
     for start, end in into:
         kind, _, supply = start.partition(".")
         other, _, chamber = inlets.get(end, end).partition(".")
         if kind == "supply" and other == "chamber":
-            found[chamber].append(supply)
-    return found
+            suppliers[chamber].append(supply)
+    return suppliers
 
 
 def _order(recording: Recording, rig: Rig) -> Iterator[str]:
     """Findings on muscles above their supply's pressure, and regulators above their inlet's."""
-    fed = {dotted("muscle_pressure", chamber): found for chamber, found in fed_by(rig).items()}
+    fed = {
+        dotted("muscle_pressure", chamber): suppliers for chamber, suppliers in fed_by(rig).items()
+    }
     for regulator in rig.tables("supply"):
         inlet = _inlet_of(rig, regulator)
         if inlet and dotted("supply_pressure", inlet) in recording.channels:
@@ -407,12 +411,12 @@ def _order(recording: Recording, rig: Rig) -> Iterator[str]:
             above = recording.channels[name][rows] > allowed
             share = float(np.mean(above))
             if share > _ORDER_TIME_SHARE:
-                own, other = (
-                    _told(recording, name, float(np.median(own)))
-                    for own in (recording.channels[name][rows], limit)
+                median, other = (
+                    _told(recording, name, float(np.median(median)))
+                    for median in (recording.channels[name][rows], limit)
                 )
                 yield (
-                    f"{name} is above {source} for {100 * share:.0f} % of the time (medians {own} "
+                    f"{name} is above {source} for {100 * share:.0f} % of the time (medians {median} "
                     f"and {other}); at most {100 * _ORDER_TIME_SHARE:.0f} % is allowed: are the "
                     "two columns swapped, or one of their units wrong?"
                 )
@@ -427,10 +431,10 @@ def _highest(recording: Recording, rig: Rig, supply: str) -> tuple[str, Mask, Ar
     full = dotted("supply_pressure", supply)
     if full in recording.channels:
         return full, recording.mask[full], recording.channels[full]
-    told = _set_to(recording, rig, supply)
-    if told is None:
+    set_to = _set_to(recording, rig, supply)
+    if set_to is None:
         return None
-    size, command = told
+    size, command = set_to
     source = f"the largest {command}" if command else f"{full} of the rig file"
     return source, np.ones(len(recording), dtype=np.bool_), np.full(len(recording), size)
 
@@ -451,12 +455,12 @@ class _Moving:
 def _moving(rig: Rig, settings: DiagnosisSettings) -> list[_Moving]:
     """The joints of a rig, or its hanging load."""
     ends = rig.ports("muscle").values()
-    found = []
+    moving = []
     for joint, table in rig.tables("joint").items():
         low, high = float(table["min_angle"]), float(table["max_angle"])
         pulled = tuple(block_of(e["chamber"]) for e in ends if e["joint"] == dotted("joint", joint))
         margin = max(_LEAST_ANGLE_MARGIN, settings.range_margin * (high - low))
-        found.append(
+        moving.append(
             _Moving(
                 dotted("joint_angle", joint),
                 "rad",
@@ -472,8 +476,8 @@ def _moving(rig: Rig, settings: DiagnosisSettings) -> list[_Moving]:
         low, high = float(load["min_length"]), float(load["max_length"])
         pulled = tuple(block_of(e["chamber"]) for e in ends)
         margin = max(_LEAST_LENGTH_MARGIN, settings.range_margin * (high - low))
-        found.append(_Moving("length", "m", low, high, margin, _FASTEST_LOAD, pulled))
-    return found
+        moving.append(_Moving("length", "m", low, high, margin, _FASTEST_LOAD, pulled))
+    return moving
 
 
 def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
@@ -619,12 +623,12 @@ def _dead(recording: Recording, rig: Rig) -> dict[str, str]:
     less.
     """
     ambient = float(rig.model["gas"]["ambient_pressure"])
-    found: dict[str, str] = {}
+    evidence: dict[str, str] = {}
     for command, pressure in _commanded(rig):
         if command not in recording.channels or pressure not in recording.channels:
             continue
-        there = recording.valid(command, pressure)
-        values = recording.channels[command][there]
+        both = recording.valid(command, pressure)
+        values = recording.channels[command][both]
         width = max(2, round(_DEAD_COMMAND_TIME / recording.sample_time))
         if values.size < 32 or np.ptp(values) > 0.0 or len(recording) <= 3 * width:
             continue
@@ -636,14 +640,14 @@ def _dead(recording: Recording, rig: Rig) -> dict[str, str]:
             change = np.exp(np.abs(np.log(later / now)))
         largest = float(np.nanmax(np.where(still, change, np.nan), initial=1.0))
         if largest > _DEAD_COMMAND_RATIO:
-            found[command] = (
+            evidence[command] = (
                 f"{command} has one value throughout "
                 f"({_told(recording, command, values[0], digits='g')}) while {pressure} stands "
                 f"still and then changes {largest:.3g}-fold (absolute) within "
                 f"{_DEAD_COMMAND_TIME:g} s; at most {_DEAD_COMMAND_RATIO:g}-fold can be of one "
                 "command"
             )
-    return found
+    return evidence
 
 
 def without_dead_commands(
@@ -665,28 +669,31 @@ def without_dead_commands(
     -------
     recordings : list of Recording
         As they were where nothing could be judged otherwise, for :func:`check_plausible`.
-    said : list of Faulty
+    faults : list of Faulty
         Each command that was not logged.
     """
     if not all(moves_by_gauges(recording, rig) for recording in recordings):
         return list(recordings), []
-    kept, said = list(recordings), list[Faulty]()
+    recordings_left, faults = list(recordings), list[Faulty]()
     for command in dict.fromkeys(command for command, _ in _commanded(rig)):
-        found = {r.name: _dead(r, rig).get(command) for r in kept}
-        dead = {name: text for name, text in found.items() if text}
+        evidence = {r.name: _dead(r, rig).get(command) for r in recordings_left}
+        dead = {name: text for name, text in evidence.items() if text}
         # what has that one value elsewhere was not logged there either
-        live = [r for r in kept if r.name not in dead and _moves(r, command)]
+        live = [r for r in recordings_left if r.name not in dead and _moves(r, command)]
         if not dead:
             continue
         if any(r.role == "fit" for r in live):
-            gone = [r.name for r in kept if all(r is not one for one in live)]
-            kept, done = live, f"{', '.join(gone)} cannot be judged with the others without it"
+            gone = [r.name for r in recordings_left if all(r is not one for one in live)]
+            recordings_left, done = (
+                live,
+                f"{', '.join(gone)} cannot be judged with the others without it",
+            )
         else:
-            kept = [_without(r, command) for r in kept]
+            recordings_left = [_without(r, command) for r in recordings_left]
             done = "what it drives is not judged"
         text = f"{next(iter(dead.values()))}: it was not logged; {done}"
-        said.append(Faulty(command, "not_logged", text))
-    return kept, said
+        faults.append(Faulty(command, "not_logged", text))
+    return recordings_left, faults
 
 
 def _moves(recording: Recording, channel: str) -> bool:
@@ -724,7 +731,7 @@ def check_sense(
     DiagnosisError
         With every finding.
     """
-    found = []
+    findings = []
     for block in (b for b in blocks if channel_of(b.channel) == "joint_angle"):
         for prepared in recordings:
             try:
@@ -732,10 +739,10 @@ def check_sense(
             except SimulationError:
                 continue
             if text:
-                found.append(f"recording {prepared.recording.name!r}: {text}")
+                findings.append(f"recording {prepared.recording.name!r}: {text}")
     # one recording may be odd; a heading is wrong in all of them
-    if found and len(found) * 2 > len(recordings):
-        _refuse(case, found)
+    if findings and len(findings) * 2 > len(recordings):
+        _refuse(case, findings)
 
 
 def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
@@ -784,7 +791,7 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
     for one, two in itertools.combinations([d for d in block.drives if d in signals], 2):
         text = f"with {one} and {two} in each other's place it would: are these columns swapped?"
         others.append((1.0, 0.0, {one: signals[two], two: signals[one]}, text))
-    found = []
+    misfits = []
     for factor, offset, swapped, text in others:
         raw = prepared.raw | {name: offset + factor * prepared.raw[name]}
         noise = prepared.noise | {name: abs(factor) * prepared.noise[name]}
@@ -797,8 +804,8 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         expected = offset + factor * measured
         if factor < 0.0:  # where it turns about is not known
             expected, model = expected - expected.mean(), model - model.mean()
-        found.append((_misfit(expected, model), text))
-    best, text = min(found, default=(math.inf, ""))
+        misfits.append((_misfit(expected, model), text))
+    best, text = min(misfits, default=(math.inf, ""))
     return f"{shown}; {text}" if best < _SENSE_RIGHT else None
 
 

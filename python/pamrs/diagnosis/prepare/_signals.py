@@ -216,7 +216,7 @@ class Prepared:
                 known = np.repeat(mask, each)
                 commands[name] = np.ascontiguousarray(early)
                 logged[name] = np.where(known, logged[name], np.repeat(early, each))
-        if all(commands[name] is own for name, own in self.commands.items()):
+        if all(commands[name] is values for name, values in self.commands.items()):
             return None
         return replace(self, commands=commands, held=logged)
 
@@ -348,15 +348,15 @@ def lengths_of(values: Array, noise: float, dt: float, settings: DiagnosisSettin
     shortest, length = filter_length(math.inf, settings), filter_length(dt, settings)
     if _is_one_cubic(values, noise, length):
         return np.zeros(values.size, dtype=np.intp)
-    found = np.ones(values.size, dtype=np.intp)
+    lengths = np.ones(values.size, dtype=np.intp)
     for count in sorted({shortest, max(shortest, round(0.5 * length) | 1), length}):
         basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), 4))[0]
         frames = np.lib.stride_tricks.sliding_window_view(values - values.mean(), count)
         missed = np.sum((frames - (frames @ basis) @ basis.T) ** 2, axis=1) / (count - 4)
         usual = max(noise**2, float(np.median(missed)))
         fits = missed <= usual * chi2.isf(_SMOOTHING_ODDS, count - 4) / (count - 4)
-        found[np.pad(fits, count // 2, mode="edge")] = count
-    return found
+        lengths[np.pad(fits, count // 2, mode="edge")] = count
+    return lengths
 
 
 def _is_one_cubic(values: Array, noise: float, length: int) -> bool:
@@ -454,17 +454,17 @@ def _state(
             continue
         powers = np.vander((rows - at) / count, 4, increasing=True)
         inverse = np.linalg.inv(powers.T @ powers)
-        found = inverse @ (powers.T @ values[rows])
-        left = values[rows] - powers @ found
-        slope = float(found[1]) / (count * dt)
+        cubic = inverse @ (powers.T @ values[rows])
+        rest = values[rows] - powers @ cubic
+        slope = float(cubic[1]) / (count * dt)
         scatters = _START_LONGER_STDS if state is not None else _START_FIRST_STDS
         most = _START_MISFIT + scatters * math.sqrt(2.0 / (count - 4))
-        rough = float(left @ left) > most * (count - 4) * noise**2
+        rough = float(rest @ rest) > most * (count - 4) * noise**2
         if state is not None and (rough or abs(slope - state[1]) > _START_SLOPE_STDS * spread):
             break
         if not rough:
             state, spread = (
-                (float(found[0]), slope),
+                (float(cubic[0]), slope),
                 noise * math.sqrt(inverse[1, 1]) / (count * dt),
             )
     return state
@@ -474,11 +474,11 @@ def _bridged(values: Array, mask: Mask) -> Array:
     """A channel with its holes bridged by cubics that turn nowhere between samples (Fritsch &
     Butland 1984), and before the first sample and after the last one as it is there.
     """
-    there, missing = np.flatnonzero(mask), np.flatnonzero(~mask)
+    known, missing = np.flatnonzero(mask), np.flatnonzero(~mask)
     bridged = values.copy()
     if missing.size:
-        between = PchipInterpolator(there, values[there])
-        bridged[missing] = between(np.clip(missing, there[0], there[-1]))
+        between = PchipInterpolator(known, values[known])
+        bridged[missing] = between(np.clip(missing, known[0], known[-1]))
     return bridged
 
 
@@ -583,8 +583,8 @@ def _noise_of(recording: Recording, name: str, settings: DiagnosisSettings) -> f
     if name not in recording.logged:
         return noise_level(values, mask, seed=seed)
     apart, logged = recording.logged[name]
-    there = np.isfinite(logged)
-    single = noise_level(np.where(there, logged, 0.0), there, seed=seed)
+    known = np.isfinite(logged)
+    single = noise_level(np.where(known, logged, 0.0), known, seed=seed)
     return single * math.sqrt(max(1.0, apart / recording.sample_time))
 
 

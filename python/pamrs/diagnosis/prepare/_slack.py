@@ -39,26 +39,26 @@ def said_of_slack(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepar
         A sentence for each block, of the recording in which it lags most.
     """
     tables = rig.tables("muscle").items()
-    slack = [qualified("muscle", name) for name, own in tables if own["buckling_load"] == 0.0]
+    slack = [qualified("muscle", name) for name, table in tables if table["buckling_load"] == 0.0]
     moving = [block for block in blocks if block.kind == "arm"]
     if not slack or not moving:
         return []
     loads = {f"{name}.buckling_load": _STRUT for name in slack}
     cores = core_rig(rig), core_rig(rig.with_parameters(loads))
-    said = []
+    notes = []
     for block in moving:
         lags = {p.recording.name: _lag(block, cores, p) for p in recordings}
         name, most = max(lags.items(), key=lambda lag: lag[1][0])
         if not most[0]:
             continue
-        off, left = (in_laboratory_units(block.channel, value) for value in most)
-        said.append(
+        off, rest = (in_laboratory_units(block.channel, value) for value in most)
+        notes.append(
             f"the model lags where a muscle is slack: {block.channel} of {name} is up to {off} "
-            f"off there, and {left} if {' and '.join(slack)} pushed back as the force model alone "
+            f"off there, and {rest} if {' and '.join(slack)} pushed back as the force model alone "
             "says; a muscle without air pushes nothing but what its buckling_load (now 0 N) says "
             "that it bears"
         )
-    return said
+    return notes
 
 
 def _lag(
@@ -75,8 +75,8 @@ def _lag(
     rows = prepared.usable(block.channel, block.drives, starts)
     rows &= np.abs(pushing - slack) > _APART_NOISES * prepared.noise[block.channel]
     measured = prepared.recording.channels[block.channel][rows]
-    lag, left = measured - slack[rows], measured - pushing[rows]
+    lag, rest = measured - slack[rows], measured - pushing[rows]
     rare = rows.sum() < _LEAST_SLACK_SHARE * prepared.n
-    if rare or np.linalg.norm(left) > _BETTER * np.linalg.norm(lag):
+    if rare or np.linalg.norm(rest) > _BETTER * np.linalg.norm(lag):
         return 0.0, 0.0
-    return float(np.abs(lag).max()), float(np.abs(left).max())
+    return float(np.abs(lag).max()), float(np.abs(rest).max())

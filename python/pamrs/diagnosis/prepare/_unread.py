@@ -35,8 +35,8 @@ def unread_tanks(rig: Rig, channels: Sequence[str]) -> list[str]:
     tanks = [name for name, table in rig.tables("supply").items() if table["kind"] == "tank"]
     gauges = [dotted("supply_pressure", name) for name in tanks]
     missing = [gauge for gauge in gauges if gauge not in channels]
-    there = {b.channel for b in available_blocks(rig, (*channels, *missing))}
-    return [gauge for gauge in missing if gauge in there]
+    with_gauges = {b.channel for b in available_blocks(rig, (*channels, *missing))}
+    return [gauge for gauge in missing if gauge in with_gauges]
 
 
 def blocks_beside_tanks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
@@ -75,9 +75,9 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
     for tank in tanks:
         name = block_of(tank)
         full = qualified("supply", name)
-        there = prepared.recording.parameters.get(begins_at(tank))
-        begun = rig.parameter(begins_at(tank)).value if there is None else there.value
-        level = np.full(prepared.n, begun)
+        own_pressure = prepared.recording.parameters.get(begins_at(tank))
+        first = rig.parameter(begins_at(tank)).value if own_pressure is None else own_pressure.value
+        level = np.full(prepared.n, first)
         flat = replace(
             prepared.shaken({tank: (level, np.zeros(prepared.n))}),
             raw=prepared.raw | {tank: level},
@@ -85,10 +85,10 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
             lengths=prepared.lengths | {tank: np.zeros(prepared.n, dtype=np.intp)},
             simulated=tuple(dict.fromkeys((*prepared.simulated, tank))),
         )
-        found = available_blocks(rig, (*names, *flat.simulated))
-        (own,) = [replace(b, window=None) for b in found if b.name == full]
+        available = available_blocks(rig, (*names, *flat.simulated))
+        (tank_block,) = [replace(b, window=None) for b in available if b.name == full]
         try:
-            value = predicted(own, core, flat.bridged())
+            value = predicted(tank_block, core, flat.bridged())
         except SimulationError:  # it then stands still
             value = level
         slope = np.gradient(value, prepared.dt)
@@ -98,16 +98,18 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
 
 def said_of_tanks(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
     """Sentences on tanks without a gauge: the blocks that their simulated pressure drives."""
-    said = []
+    notes = []
     for tank in dict.fromkeys(name for block in blocks for name in block.floating):
         name = begins_at(tank)
-        own = [p.recording.parameters[name] for p in recordings if name in p.recording.parameters]
-        begun = rig.units.said(name, "Pa", rig.parameter(name).value)
-        if own:
-            begun = "the pressure that each recording has of its own"
+        own_pressures = [
+            p.recording.parameters[name] for p in recordings if name in p.recording.parameters
+        ]
+        first = rig.units.said(name, "Pa", rig.parameter(name).value)
+        if own_pressures:
+            first = "the pressure that each recording has of its own"
         driven = " and ".join(block.name for block in blocks if tank in block.floating)
-        said.append(
+        notes.append(
             f"{tank} was not recorded: {driven} is driven by its simulated course from "
-            f"{begun}; its level and how far it falls are free in each recording"
+            f"{first}; its level and how far it falls are free in each recording"
         )
-    return said
+    return notes

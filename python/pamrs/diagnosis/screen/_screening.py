@@ -308,14 +308,14 @@ class _Looking:
 
     def try_(self, start: Start, looks: int | None = None) -> float:
         """Add the signature of a start; return its gain in chi-square (minus infinity: none)."""
-        begun = self.everywhere.get(_values(start)) if start.effect.at else None
-        tried, best = start if begun is None else begun.moved(start.effect), None
+        there = self.everywhere.get(_values(start)) if start.effect.at else None
+        tried, best = start if there is None else there.moved(start.effect), None
         for _ in range(_MOST_SIGNATURES if looks is None else looks):
-            seen = self._look(tried)
-            if seen is None:
+            shown = self._look(tried)
+            if shown is None:
                 break
-            best = seen
-            score = seen[1]
+            best = shown
+            score = shown[1]
             if (
                 score is None
                 or score.gain <= 0.0
@@ -329,11 +329,11 @@ class _Looking:
             if wanted == tried:
                 break  # its bounds hold it
             tried = wanted
-        if self.strong and start.scalable and looks is None and begun is None:
+        if self.strong and start.scalable and looks is None and there is None:
             others = [self._look(start.scaled(size)) for size in STRONG_SIZES]
             # what a signature says of other sizes than its own is not relied on
-            known = [seen for seen in (best, *others) if seen is not None]
-            best = max(known, key=lambda seen: self._taken(seen[0]), default=None)
+            known = [shown for shown in (best, *others) if shown is not None]
+            best = max(known, key=lambda shown: self._taken(shown[0]), default=None)
         if best is None:
             return -math.inf
         self.signatures.append(best[0])
@@ -344,12 +344,12 @@ class _Looking:
     def _look(self, start: Start) -> tuple[Signature, Score | None] | None:
         """The signature of a start and its score; None where the model cannot be run so."""
         what = f"the signature of {start.effect}"
-        found = self.problem.losses.part(what, lambda: self._changes(start))
-        if found is None:
+        left = self.problem.losses.part(what, lambda: self._changes(start))
+        if left is None:
             return None
         if not start.effect.at:
-            self.seen[_values(start)] = found
-        rows, _ = stacked(self.problem, found, self.inflation)
+            self.seen[_values(start)] = left
+        rows, _ = stacked(self.problem, left, self.inflation)
         entry = (start.effect, start, rows - self.tangent.rows)
         return entry, next(iter(Screen(self.tangent, [entry]).scores()), None)
 
@@ -369,13 +369,13 @@ class _Looking:
         those of the effect everywhere.
         """
         term = start.effect
-        seen = self.seen.get(_values(start), {}) if term.at else {}
-        if not seen:
+        everywhere = self.seen.get(_values(start), {}) if term.at else {}
+        if not everywhere:
             return {}
         others = places_of(self.fitted.rig, term.id, self.problem.blocks)
         rivals = [t for at in others if (t := Term(term.id, at)) != term]
-        own = {b.name for b in self.problem.blocks if not any(acts_in(t, b) for t in rivals)}
-        return {key: r for key, r in seen.items() if key[0] in own}
+        alone = {b.name for b in self.problem.blocks if not any(acts_in(t, b) for t in rivals)}
+        return {key: r for key, r in everywhere.items() if key[0] in alone}
 
     def _taken(self, entry: Signature) -> float:
         """Reduction of the chi-square by a start at its own size."""
@@ -387,8 +387,8 @@ class _Looking:
 def _values(start: Start) -> _Values:
     """Effect, form and values of a start, wherever it acts."""
     values = start.free | start.held
-    own = tuple(sorted((n.removeprefix(str(start.effect)), v) for n, v in values.items()))
-    return start.effect.id, start.form, own
+    unplaced = tuple(sorted((n.removeprefix(str(start.effect)), v) for n, v in values.items()))
+    return start.effect.id, start.form, unplaced
 
 
 def _measured(problem: Problem, channel: str) -> Array | None:
@@ -507,18 +507,23 @@ def _find_thresholds(
     A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
     """
     on, off = start.effect.info.with_role("threshold")
-    seen = _measured(problem, on.channel)
-    if seen is None:
+    measured = _measured(problem, on.channel)
+    if measured is None:
         return None
-    low, high = (float(f(seen)) for f in (np.min, np.max))
+    low, high = (float(f(measured)) for f in (np.min, np.max))
     step = (high - low) / _THRESHOLD_LEVELS
     if step <= 0.0:
         return None
 
     def at(switch_on: float, switch_off: float) -> Start:
-        own = {f"{start.effect}.{on.name}": switch_on, f"{start.effect}.{off.name}": switch_off}
+        thresholds = {
+            f"{start.effect}.{on.name}": switch_on,
+            f"{start.effect}.{off.name}": switch_off,
+        }
         return replace(
-            start, free={n: v for n, v in start.free.items() if n not in own}, held=start.held | own
+            start,
+            free={n: v for n, v in start.free.items() if n not in thresholds},
+            held=start.held | thresholds,
         )
 
     levels = [low + (k + 0.5) * step for k in range(_THRESHOLD_LEVELS)]

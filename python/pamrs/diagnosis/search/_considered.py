@@ -12,8 +12,8 @@ from pamrs.effects import Hypothesis, Term
 def fit_considered(search: Search) -> list[Candidate]:
     """Fit what of each hypothesis that the caller asks for acts in the blocks of a mismatch."""
     trial, fitted = search.trial, list[Candidate]()
-    for asked in trial.inner.considered:
-        acting = [t for t in asked.terms if any(concerns(t, b) for b in trial.suspects)]
+    for hypothesis in trial.inner.considered:
+        acting = [t for t in hypothesis.terms if any(concerns(t, b) for b in trial.suspects)]
         # what may happen at times of its own is looked for beside what lasts
         effects = sorted(
             (t for t in acting if t.is_effect),
@@ -37,13 +37,13 @@ def _add_effect(search: Search, beside: Candidate, effect: Term) -> Candidate | 
         return None  # beside events nothing else is fitted
     if not info.lasting:
         return trial.fit_events(effect if info.own else Term(effect.id), beside)
-    begun = trial.starts_of(beside)
+    starts = trial.starts_of(beside)
     short: dict[str, list[Candidate]] = {}
     for one in _possible_starts(search, beside, effect):
-        tried = trial.fit_shortly([*begun, one], beside.fit, beside.wrong)
-        if tried is not None:
-            short.setdefault(one.form, []).append(tried)
-    near = (max(tried, key=search.weight) for tried in short.values())
+        candidate = trial.fit_shortly([*starts, one], beside.fit, beside.wrong)
+        if candidate is not None:
+            short.setdefault(one.form, []).append(candidate)
+    near = (max(candidate, key=search.weight) for candidate in short.values())
     ended = [trial.fit_together(trial.starts_of(best), best.fit, best.wrong) for best in near]
     if info.transient:
         ended.append(trial.fit_events(Term(effect.id), beside))
