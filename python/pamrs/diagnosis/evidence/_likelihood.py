@@ -134,8 +134,8 @@ class _Covariance:
     """The covariance of a block's bin means under each size of the error that nobody states."""
 
     def __init__(self, times: list[Array], curves: list[Array]) -> None:
-        self._without = _Sized(0.0, times, curves)
-        self._each = [_Sized(size, times, curves) for size in _SIZES]
+        self._without = _CovarianceAtSize(0.0, times, curves)
+        self._each = [_CovarianceAtSize(size, times, curves) for size in _SIZES]
         self._sizes = np.array([0.0, *_BETWEEN])
         volume = self._between([sized.volume for sized in self._each])
         self._volume = np.array([self._without.volume, *volume])
@@ -162,7 +162,7 @@ class _Covariance:
         return BlockLikelihood(self._sizes, by_size, self._volume, count, mean, self._error_power)
 
 
-class _Sized:
+class _CovarianceAtSize:
     """Covariance of a block's bin means for one size of the unstated error.
 
     In time the error is an Ornstein-Uhlenbeck process, whose inverse covariance is tridiagonal, so

@@ -22,7 +22,7 @@ _MOST_LINES = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Shaken:
+class VibrationResponse:
     """Change of each recording's residuals by a vibration of each of some frequencies.
 
     Attributes
@@ -47,7 +47,7 @@ class Shaken:
         base: dict[Key, Residual],
         inflation: dict[str, float],
         known: Mapping[str, float] | None = None,
-    ) -> Shaken:
+    ) -> VibrationResponse:
         """Signatures of vibrations about a model that stays as it is.
 
         Parameters
@@ -90,7 +90,7 @@ class Shaken:
                 columns[frequency] = {
                     name: np.stack([one[name] for one in changes_found], axis=1) for name in rows
                 }
-        return Shaken(effect, rows, columns)
+        return VibrationResponse(effect, rows, columns)
 
     def best(self, form: str) -> Events | None:
         """The frequencies that take most of the residuals, with the sizes of each recording; None

@@ -32,7 +32,7 @@ from pamrs.diagnosis.fit._fitting import (
     stacked,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
-from pamrs.diagnosis.fit._shaken import Shaken
+from pamrs.diagnosis.fit._shaken import VibrationResponse
 from pamrs.diagnosis.fit._spread import pieces_of, pieces_spread
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.effects import EffectParameter, Term, find_parameter
@@ -143,7 +143,7 @@ def fit_events(
     # what repeats begins at frequencies; other events begin where those of the usual form are
     for form in sorted(forms, key=lambda form: form.periodic):
         if form.periodic:
-            shaken = shaken or Shaken.of(effect, problem, rig, base, inflation)
+            shaken = shaken or VibrationResponse.of(effect, problem, rig, base, inflation)
             events = shaken.best(form.name)
         elif form.own:
             events = _drifting(effect, form.name, problem, rig, base, inflation)
@@ -225,7 +225,9 @@ def look_for_events(
     size = known.get(effect.info.leading.name)
     periodic = effect.info.form(form).periodic
     shaken = (
-        Shaken.of(effect, problem, rig, base, inflation, known).best(form) if periodic else None
+        VibrationResponse.of(effect, problem, rig, base, inflation, known).best(form)
+        if periodic
+        else None
     )
 
     def start_in(alone: Problem, prepared: Prepared) -> Events | None:
@@ -457,11 +459,11 @@ def _jointly(
     One after the other would creep: a baseline that was fitted without the events holds half of
     what a mass does.
     """
-    joint = _Joint.of(events, problem, nominal, baseline, inflation)
-    count = len(joint.names)
+    vector = _EventVector.of(events, problem, nominal, baseline, inflation)
+    count = len(vector.names)
     try:
         x, (values, jacobian, by_block), spent = levenberg_marquardt(
-            joint.evaluate, joint.begin(baseline), joint.bounds(), _EVALUATIONS_TOGETHER
+            vector.evaluate, vector.begin(baseline), vector.bounds(), _EVALUATIONS_TOGETHER
         )
     except SimulationError:
         return None
@@ -472,13 +474,14 @@ def _jointly(
     )
     spread = np.maximum(wide, np.sqrt(np.clip(np.diag(covariance), 0.0, None)))
     std_of = {
-        place: float(s) for place, s in zip(joint.places, spread[count:] * joint.scale, strict=True)
+        place: float(s)
+        for place, s in zip(vector.places, spread[count:] * vector.scale, strict=True)
     }
     first = next(iter(events.values))
     event_std = {
         p: std_of.get((first, p), std_of.get(("", p), math.nan)) for p in events.values[first]
     }
-    names, scaling = joint.names, joint.scaling
+    names, scaling = vector.names, vector.scaling
     return replace(
         baseline,
         effects=(events.effect,),
@@ -490,12 +493,12 @@ def _jointly(
         residuals=by_block,
         moved={n: float(v) for n, v in zip(names, x[:count], strict=True)},
         evaluations=spent,
-        events=joint.told(x),
+        events=vector.events_at(x),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Joint:
+class _EventVector:
     """Baseline and events of every recording as one vector.
 
     Attributes
@@ -514,7 +517,7 @@ class _Joint:
         The other elements; one that all recordings share has no recording.
     scale : (k,) array
         Scale of each of these [SI].
-    kept : list of array
+    slopes : list of array
         Sensitivities to the baseline parameters in each recording, which stay as they were without
         the events.
     """
@@ -526,12 +529,12 @@ class _Joint:
     scaling: Scaling
     places: list[tuple[str, str]]
     scale: Array
-    kept: list[Array]
+    slopes: list[Array]
 
     @staticmethod
     def of(
         events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
-    ) -> _Joint:
+    ) -> _EventVector:
         """The vector of a problem."""
         effect, settings = events.effect, problem.settings
         shared = effect.info.form(events.form).shared
@@ -547,9 +550,9 @@ class _Joint:
             )
             slopes.append(np.zeros((rows.size, 0)) if slope is None else slope[:, : len(names)])
         scaling = Scaling(nominal, names, {}, settings)
-        return _Joint(events, problem, inflation, names, scaling, places, scale, slopes)
+        return _EventVector(events, problem, inflation, names, scaling, places, scale, slopes)
 
-    def told(self, x: Array) -> Events:
+    def events_at(self, x: Array) -> Events:
         """Events that the elements of a vector stand for."""
         values = {name: dict(event) for name, event in self.events.values.items()}
         for (name, p), value in zip(self.places, x[len(self.names) :] * self.scale, strict=True):
@@ -564,12 +567,14 @@ class _Joint:
         effect, count = self.events.effect, len(self.names)
         wanted = sorted({p for event in self.events.values.values() for p in event})
         names = [f"{effect}.{p}" for p in wanted]
-        by_block = residuals(self.problem, self.scaling.rig(x[:count], {}), names, self.told(x))
+        by_block = residuals(
+            self.problem, self.scaling.rig(x[:count], {}), names, self.events_at(x)
+        )
         slopes = np.array(
             [self.scaling.slope(n, float(v)) for n, v in zip(self.names, x[:count], strict=True)]
         )
         parts, columns = [], []
-        for prepared, fixed in zip(self.problem.recordings, self.kept, strict=True):
+        for prepared, fixed in zip(self.problem.recordings, self.slopes, strict=True):
             rows, slope = stacked(
                 replace(self.problem, recordings=[prepared]), by_block, self.inflation
             )

@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class _Along:
+class _JoinedInput:
     """Missing input and its arguments, all recordings one after the other.
 
     Attributes
@@ -61,7 +61,7 @@ class _Along:
     recording: NDArray[np.intp]
 
     @classmethod
-    def of(cls, recordings: Sequence[MissingRecording], names: Sequence[str]) -> _Along:
+    def of(cls, recordings: Sequence[MissingRecording], names: Sequence[str]) -> _JoinedInput:
         """Rows of some recordings."""
         arguments = {
             n: np.concatenate([recording.along(n) for recording in recordings]) for n in names
@@ -121,7 +121,7 @@ def _direction(rate: Array) -> Array:
     return np.tanh(rate / (_TURN * fastest))
 
 
-def _candidates(along: _Along, position: str, rate: str) -> dict[str, Array]:
+def _candidates(along: _JoinedInput, position: str, rate: str) -> dict[str, Array]:
     """Columns of a function of each argument, the simplest first."""
     direction = _direction(along.arguments[rate])
     columns = {"": np.ones((along.value.size, 1))}
@@ -240,7 +240,7 @@ def _explained(missing: MissingInput) -> tuple[str, float, str]:
     """Argument that explains most of an input (``time`` for a steady one, empty where no single one
     does), the share of its square that a function of it explains, cross-validated, and a sentence.
     """
-    along = _Along.of(missing.recordings, [*missing.units])
+    along = _JoinedInput.of(missing.recordings, [*missing.units])
     candidates = _candidates(along, missing.position, missing.rate)
     shares = {name: along.told(columns) for name, columns in candidates.items()}
     best = max(shares.values())
@@ -266,7 +266,7 @@ def _explained(missing: MissingInput) -> tuple[str, float, str]:
     return argument, min(1.0, max(shares[name], 0.0)), sentence + _taken(missing, along)
 
 
-def _taken(missing: MissingInput, along: _Along) -> str:
+def _taken(missing: MissingInput, along: _JoinedInput) -> str:
     """Words on the share of an input's square that named effects take; empty where it is small."""
     laws = [recording.law for recording in missing.recordings if recording.law is not None]
     if len(laws) < len(missing.recordings):
@@ -297,7 +297,7 @@ def _sense(missing: MissingInput, mean: float) -> str:
     return f" towards a {more} {spoken_name(missing.position)}"
 
 
-def _sentence(missing: MissingInput, along: _Along, name: str, fit: Array) -> str:
+def _sentence(missing: MissingInput, along: _JoinedInput, name: str, fit: Array) -> str:
     """Sentence on the input as a function of one argument."""
     rate = along.arguments[missing.rate]
     every = along.weight > 0.0
@@ -330,7 +330,7 @@ def _sentence(missing: MissingInput, along: _Along, name: str, fit: Array) -> st
     return f"{size_in_words}, {'growing' if trend > 0.0 else 'falling'} with the {noun}"
 
 
-def _beside(missing: MissingInput, along: _Along, name: str, beside: str) -> str:
+def _beside(missing: MissingInput, along: _JoinedInput, name: str, beside: str) -> str:
     """Dependence of the input's size on a second argument, in words."""
     rate = np.abs(along.arguments[missing.rate])
     rows = rate > np.median(rate) if name == missing.rate else along.weight > 0.0

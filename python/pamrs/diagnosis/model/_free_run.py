@@ -293,14 +293,14 @@ def _moved(
     return np.asarray(directions.T @ far(math.exp(low)))
 
 
-class _Begins(NamedTuple):
+class _StartTemperature(NamedTuple):
     """Temperature at which a gas begins, and its standard deviation [K]."""
 
     kelvin: float
     unsure: float
 
 
-def _gas_starts(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
+def _gas_starts(rig: Rig, prepared: Prepared) -> dict[str, _StartTemperature]:
     """Temperature at which each gas with a balance of energy begins, by chamber: that of the room,
     but where its thermometer or its pressure clearly says otherwise.
     """
@@ -315,7 +315,7 @@ def _gas_starts(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
         away = abs(begins - room) > settings.begun_temperature_error
         # a pressure that stands still does not tell
         unsure = settings.begun_temperature_error if away or read is not None else _OFF_WARM
-        starts[name] = _Begins(begins if away else room, unsure)
+        starts[name] = _StartTemperature(begins if away else room, unsure)
     return starts
 
 

@@ -17,7 +17,7 @@ _MOST_MOVED = 2e4
 _PRESSURES: Final = with_trait("pressure")
 
 
-class Before(NamedTuple):
+class TimeBefore(NamedTuple):
     """Assumed time before a recording: commands and pressures stay at their first values, and
     lately the pressures moved at their first rate.
 

@@ -19,7 +19,7 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array, Index, Mask
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.prepare._before import Before
+from pamrs.diagnosis.prepare._before import TimeBefore
 from pamrs.diagnosis.prepare._blocks import (
     WINDOW_SAMPLES_PER_STATE,
     Block,
@@ -157,7 +157,7 @@ class _Beginnings:
     def __init__(self, blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> None:
         self.core, self.prepared = core, prepared
         self.at = {block.channel: block for block in blocks}
-        self._kept: dict[tuple[str, bool], Array] = {}
+        self._predictions: dict[tuple[str, bool], Array] = {}
 
     def remembered(self, block: Block) -> int:
         """Samples up to the last one that shows how what nobody measured in a block began."""
@@ -180,14 +180,18 @@ class _Beginnings:
             for name in _set(block)
         }
         try:
-            return predicted(block, self.core, prepared, outlets) - self._from(block, moving=False)
+            return predicted(block, self.core, prepared, outlets) - self._predicted_from(
+                block, moving=False
+            )
         except SimulationError:
             return np.zeros(0)  # the fit says what cannot be predicted
 
     def _by_tubes(self, block: Block) -> Array:
         """Change of a prediction if air flowed through tubes before; empty where it did not."""
         try:
-            apart = self._from(block, moving=True) - self._from(block, moving=False)
+            apart = self._predicted_from(block, moving=True) - self._predicted_from(
+                block, moving=False
+            )
             little = np.abs(apart).max() <= _STILL_NOISES * self.prepared.noise[block.channel]
             at_rest = all(
                 (little and self._stands_still(tube)) or self._waits(tube) for tube in block.tubes
@@ -237,25 +241,25 @@ class _Beginnings:
         read = self.prepared.recording.channels[channel][:early][rows]
 
         def missed(moving: bool) -> float:
-            rest = read - self._from(self.at[channel], moving=moving)[:early][rows]
+            rest = read - self._predicted_from(self.at[channel], moving=moving)[:early][rows]
             return float(np.var(rest)) * rest.size / self.prepared.noise[channel] ** 2
 
         rest, freedom = missed(False), read.size - 1
         return rest < freedom + 3.0 * math.sqrt(2.0 * freedom), 0.5 * (missed(True) - rest)
 
-    def _from(self, block: Block, *, moving: bool) -> Array:
+    def _predicted_from(self, block: Block, *, moving: bool) -> Array:
         """Prediction of a block whose tubes began at rest, or as a flow leaves them."""
         key = (block.name, moving)
-        if key not in self._kept:
+        if key not in self._predictions:
             longest = max((tube.delay for tube in block.tubes), default=0.0) / self.prepared.dt
-            before = Before(
+            before = TimeBefore(
                 math.ceil(_FLOW_DELAYS * longest),
                 math.ceil(_MOVING_DELAYS * longest),
             )
-            self._kept[key] = predicted(
+            self._predictions[key] = predicted(
                 block, self.core, self.prepared, before=before if moving else None
             )
-        return self._kept[key]
+        return self._predictions[key]
 
 
 def _set(block: Block) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array, Mask
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.prepare._before import Before
+from pamrs.diagnosis.prepare._before import TimeBefore
 from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of, thermometers_of
 from pamrs.effects import CLOSURE_OF
 from pamrs.rig import Rig
@@ -261,7 +261,7 @@ def _flow_paths(rig: Rig, has: frozenset[str]) -> list[_FlowPath]:
     return paths
 
 
-class _Map:
+class _BlockMap:
     """Channels and parameters that belong to each block of a rig."""
 
     def __init__(self, rig: Rig, channels: tuple[str, ...]) -> None:
@@ -695,10 +695,10 @@ def unjudged_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Unjudged]:
 
 def _all_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block | Unjudged]:
     """Every block of a rig, judged or not."""
-    have = _Map(rig, channels)
+    have = _BlockMap(rig, channels)
     # what a small flow adds up to is seen from the valve on: two gauges at a tube hardly tell it
     closed = tuple(name for name in channels if channel_of(name) != "line_pressure")
-    whole = _Map(rig, closed)
+    whole = _BlockMap(rig, closed)
 
     def chamber(name: str) -> Block | Unjudged:
         block = whole.chamber(name)
@@ -839,7 +839,7 @@ def predicted(
     core: _core.Rig,
     prepared: Prepared,
     outlets: dict[str, float] | None = None,
-    before: Before | None = None,
+    before: TimeBefore | None = None,
 ) -> Array:
     """A block's output over a recording, every window from its measured start.
 
@@ -854,7 +854,7 @@ def predicted(
     outlets : dict of str to float, optional
         Where regulators without a gauge begin [Pa, gauge], by their full names; at the pressure of
         what they feed by default.
-    before : Before, optional
+    before : TimeBefore, optional
         What nobody measured begins as this leaves it, and not at rest.
 
     Returns

@@ -96,19 +96,19 @@ class Alignment:
         return self.rate * time + self.lag
 
 
-class Told(NamedTuple):
+class SharedRows(NamedTuple):
     """Rows of the slower of two recordings at an alignment: those that lie in the other one, those
     in which some channel's deviations are the same, and those in which all channels that show
     anything differ.
     """
 
-    way: Alignment
+    alignment: Alignment
     inside: Mask
     same: Mask
     other: Mask
 
 
-class _Channel(NamedTuple):
+class _Deviations(NamedTuple):
     """A channel: its values, where they are known, their deviations by their standard deviation
     (zero where nothing is known), and the step of the converter where the noise is far smaller.
     """
@@ -118,27 +118,29 @@ class _Channel(NamedTuple):
     deviations: Array
     step: float
 
-    def at(self, rows: Index) -> _Channel:
+    def at(self, rows: Index) -> _Deviations:
         """Channel at some rows."""
-        return _Channel(self.values[rows], self.known[rows], self.deviations[rows], self.step)
+        return _Deviations(self.values[rows], self.known[rows], self.deviations[rows], self.step)
 
 
-class Channels:
+class ChannelDeviations:
     """Channels of recordings with their deviations, each found once."""
 
     def __init__(self) -> None:
-        self._found: dict[tuple[Recording, str], _Channel] = {}
+        self._by_name: dict[tuple[Recording, str], _Deviations] = {}
 
-    def of(self, recording: Recording, names: Sequence[str]) -> dict[str, _Channel]:
+    def of(self, recording: Recording, names: Sequence[str]) -> dict[str, _Deviations]:
         """Channels of a recording, by name."""
         for name in names:
-            if (recording, name) not in self._found:
+            if (recording, name) not in self._by_name:
                 values, known = recording.channels[name], recording.mask[name]
-                self._found[recording, name] = _channel(values, known)
-        return {name: self._found[recording, name] for name in names}
+                self._by_name[recording, name] = _channel(values, known)
+        return {name: self._by_name[recording, name] for name in names}
 
 
-def told(slow: Recording, fast: Recording, names: list[str], channels: Channels) -> Iterator[Told]:
+def shared_rows(
+    slow: Recording, fast: Recording, names: list[str], channels: ChannelDeviations
+) -> Iterator[SharedRows]:
     """Every alignment at which deviations of some channel are the same.
 
     Of two recordings of a million samples each it takes some seconds, most of them for correlations
@@ -150,12 +152,12 @@ def told(slow: Recording, fast: Recording, names: list[str], channels: Channels)
         By sample time.
     names : list of str
         Channels that both have measured.
-    channels : Channels
+    channels : ChannelDeviations
         What was found of recordings before.
 
     Yields
     ------
-    Told
+    SharedRows
     """
     slow_channels, fast_channels = channels.of(slow, names), channels.of(fast, names)
     ratio = slow.sample_time / fast.sample_time
@@ -177,12 +179,12 @@ def told(slow: Recording, fast: Recording, names: list[str], channels: Channels)
 # ------------------------------------------------------------------ channels
 
 
-def _channel(values: Array, known: Mask) -> _Channel:
+def _channel(values: Array, known: Mask) -> _Deviations:
     """Channel with the deviation of each sample from what its neighbours predict."""
     index = np.arange(values.size)
     nothing = np.zeros(values.size)
     if known.sum() < 4 * _BESIDE_SAMPLES or not np.ptp(values[known]) > 0.0:
-        return _Channel(nothing, known, nothing, 0.0)
+        return _Deviations(nothing, known, nothing, 0.0)
     filled = values if known.all() else np.interp(index, index[known], values[known])
     centred, offsets = filled - filled.mean(), np.r_[-_BESIDE_SAMPLES:0, 1 : _BESIDE_SAMPLES + 1]
     inner = known & (index >= _BESIDE_SAMPLES) & (index < values.size - _BESIDE_SAMPLES)
@@ -204,10 +206,10 @@ def _channel(values: Array, known: Mask) -> _Channel:
     noise = size / float(np.sqrt(1.0 + weights @ weights))
     coarse = step if step > _COARSE_STEP * noise else 0.0
     if not size > 1e-12 * float(np.abs(centred).max()):
-        return _Channel(filled, known, nothing, coarse)
+        return _Deviations(filled, known, nothing, coarse)
     # a step of the signal is left in all samples beside it
     steps = uniform_filter1d((counted & ~use).astype(float), 4 * _BESIDE_SAMPLES + 1) > 1e-6
-    return _Channel(filled, known, np.where(inner & ~steps, deviations / size, 0.0), coarse)
+    return _Deviations(filled, known, np.where(inner & ~steps, deviations / size, 0.0), coarse)
 
 
 def _followed(source: Array, offsets: Index, wanted: Array, use: Mask) -> tuple[Array, Array]:
@@ -236,7 +238,7 @@ def _step(values: Array) -> float:
     return step if np.mean(np.abs(off - np.round(off)) < 0.02) > 0.99 else 0.0
 
 
-def _moved(fast: Recording, name: str, one: _Channel, at: Array, width: float) -> _Channel:
+def _moved(fast: Recording, name: str, one: _Deviations, at: Array, width: float) -> _Deviations:
     """A channel at times [s], which may be its own, from either end."""
     for way in (1, -1):
         apart = at - fast.time[::way] if at.size == len(fast) else np.inf
@@ -245,7 +247,7 @@ def _moved(fast: Recording, name: str, one: _Channel, at: Array, width: float) -
     return _seen(fast, name, at, width)._replace(step=one.step)
 
 
-def _seen(fast: Recording, name: str, at: Array, width: float) -> _Channel:
+def _seen(fast: Recording, name: str, at: Array, width: float) -> _Deviations:
     """A channel at times [s]; means over a width [s] above its sample time. What lies between two
     samples or is a mean is on no step of a converter, and has its pattern all the same.
     """
@@ -269,8 +271,8 @@ def _seen(fast: Recording, name: str, at: Array, width: float) -> _Channel:
 def _clocks(
     slow: Recording,
     fast: Recording,
-    slow_channels: dict[str, _Channel],
-    fast_channels: dict[str, _Channel],
+    slow_channels: dict[str, _Deviations],
+    fast_channels: dict[str, _Deviations],
 ) -> Iterator[tuple[float, float]]:
     """Rates of the slower recording's clock in the other one, and times from which they run [1, s]:
     as both say; backwards; sample by sample; as blocks of it are found there.
@@ -288,8 +290,8 @@ def _clocks(
 def _rate(
     slow: Recording,
     fast: Recording,
-    slow_channels: dict[str, _Channel],
-    fast_channels: dict[str, _Channel],
+    slow_channels: dict[str, _Deviations],
+    fast_channels: dict[str, _Deviations],
 ) -> float | None:
     """The rate at which the deviations of blocks are found in the other recording; None where they
     are not.
@@ -326,15 +328,15 @@ def _rate(
 def _at(
     slow: Recording,
     fast: Recording,
-    channels: tuple[dict[str, _Channel], dict[str, _Channel]],
-    way: Alignment,
-) -> Iterator[Told]:
+    channels: tuple[dict[str, _Deviations], dict[str, _Deviations]],
+    alignment: Alignment,
+) -> Iterator[SharedRows]:
     """Alignments of one rate at which some channel's deviations are those of the other one."""
     slow_channels, fast_channels = channels
-    step = way.rate * slow.sample_time
+    step = alignment.rate * slow.sample_time
     count = int(fast.duration / abs(step) + 1.5)
-    at: Array = way.lag + step * np.arange(count, dtype=np.float64)
-    width = abs(step) if way.mean else 0.0
+    at: Array = alignment.lag + step * np.arange(count, dtype=np.float64)
+    width = abs(step) if alignment.mean else 0.0
     other = {name: _moved(fast, name, one, at, width) for name, one in fast_channels.items()}
     between = abs(step) / fast.sample_time
     whole = abs(between - round(between)) < 1e-6  # what lies between samples is on no step
@@ -356,8 +358,8 @@ def _at(
                 same[rows] |= a.known & b.known
             others[rows] |= unlike
         if same.sum() >= LEAST_SAMPLES:
-            here = Alignment(way.rate, way.lag + lag * step, way.mean)
-            yield Told(here, inside, same, others & ~same)
+            here = Alignment(alignment.rate, alignment.lag + lag * step, alignment.mean)
+            yield SharedRows(here, inside, same, others & ~same)
 
 
 def _single(values: Array) -> NDArray[np.float32]:
@@ -365,7 +367,7 @@ def _single(values: Array) -> NDArray[np.float32]:
     return values.astype(np.float32)
 
 
-def _lags(a: _Channel, b: _Channel) -> dict[int, float]:
+def _lags(a: _Deviations, b: _Deviations) -> dict[int, float]:
     """Rows by which one channel may run behind in the other one, and the correlation of their
     deviations where these go together there and nowhere else, 0 elsewhere: a command that is
     repeated has its periods too.
@@ -397,7 +399,7 @@ def _lags(a: _Channel, b: _Channel) -> dict[int, float]:
     return shares
 
 
-def _by_window(a: _Channel, b: _Channel) -> tuple[Mask, Mask, bool]:
+def _by_window(a: _Deviations, b: _Deviations) -> tuple[Mask, Mask, bool]:
     """Rows about which the deviations of one channel follow those of the other one, rows about
     which they do not, and whether the two differ so clearly that windows can be told apart.
     """
@@ -425,7 +427,7 @@ def _by_window(a: _Channel, b: _Channel) -> tuple[Mask, Mask, bool]:
     return alike, says & (share <= _FOLLOW_SHARE), clear
 
 
-def _same_flips(a: _Channel, b: _Channel) -> bool:
+def _same_flips(a: _Deviations, b: _Deviations) -> bool:
     """True where two channels on the steps of a converter flip in the same samples; noise of their
     own would let them flip in others.
     """
@@ -460,9 +462,9 @@ def _flips(levels: Array) -> int:
 def _between(
     slow: Recording,
     fast: Recording,
-    slow_channels: dict[str, _Channel],
-    other: dict[str, _Channel],
-) -> Iterator[Told]:
+    slow_channels: dict[str, _Deviations],
+    other: dict[str, _Deviations],
+) -> Iterator[SharedRows]:
     """Samples of one run that were dealt out to two recordings: those of one lie at a whole
     fraction between those of the other one and differ by noise alone, and no command that is
     repeated made both.
@@ -476,7 +478,7 @@ def _between(
             continue
         inside = (slow.time + lag >= 0.0) & (slow.time + lag <= fast.duration)
         if inside.sum() >= LEAST_SAMPLES:
-            yield Told(Alignment(1.0, lag), inside, inside, np.zeros(inside.size, dtype=bool))
+            yield SharedRows(Alignment(1.0, lag), inside, inside, np.zeros(inside.size, dtype=bool))
             return
 
 
@@ -492,7 +494,7 @@ def _repeats(slow: Recording, fast: Recording) -> bool:
     return False
 
 
-def _fraction(a: _Channel, b: _Channel, dt: float) -> float | None:
+def _fraction(a: _Deviations, b: _Deviations, dt: float) -> float | None:
     """Time [s] between the samples of two channels where it is a whole fraction of the sample time
     and nothing but noise is left between the two; None elsewhere.
     """

@@ -17,10 +17,10 @@ from pamrs.diagnosis.prepare._deviations import (
     LEAST_SAMPLES,
     WINDOW_SAMPLES,
     Alignment,
-    Channels,
-    Told,
+    ChannelDeviations,
+    SharedRows,
     is_set,
-    told,
+    shared_rows,
 )
 from pamrs.recordings import Recording
 
@@ -74,7 +74,7 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
     """
     places = range(len(recordings))
     kept_parts: dict[int, list[Recording]] = {}  # by place: one recording may be listed twice
-    notes, channels = list[str](), Channels()
+    notes, channels = list[str](), ChannelDeviations()
     for place in sorted(places, key=lambda k: recordings[k].role != "fit"):
         before = [one for parts in kept_parts.values() for one in parts]
         kept_parts[place], notes_of_one = _new_in(recordings[place], before, channels)
@@ -83,7 +83,7 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
 
 
 def _new_in(
-    recording: Recording, before: Sequence[Recording], channels: Channels
+    recording: Recording, before: Sequence[Recording], channels: ChannelDeviations
 ) -> tuple[list[Recording], list[str]]:
     """Parts of a recording that are not in others, and a sentence where these are not all of it."""
     for other in before:
@@ -124,7 +124,7 @@ def _left_of(
     recording: Recording,
     free: Sequence[tuple[float, float]],
     before: Sequence[Recording],
-    channels: Channels,
+    channels: ChannelDeviations,
 ) -> list[tuple[float, float]]:
     """Stretches that share nothing with any recording of another role, long enough for a proof."""
     least = max(_LEAST_LEFT, LEAST_SAMPLES * recording.sample_time)
@@ -153,7 +153,7 @@ def _called(recording: Recording) -> str:
 def overlap(
     one: Recording,
     other: Recording,
-    channels: Channels | None = None,
+    channels: ChannelDeviations | None = None,
 ) -> Overlap | None:
     """The stretch that two recordings share, noise included; None where there is none.
 
@@ -163,7 +163,7 @@ def overlap(
     ----------
     one, other : Recording
         In any order.
-    channels : Channels, optional
+    channels : ChannelDeviations, optional
         What was found of the recordings before.
 
     Returns
@@ -175,17 +175,17 @@ def overlap(
     slow, fast = (one, other) if one.sample_time >= other.sample_time else (other, one)
     if not names or slow.sample_time > _MOST_RATE_RATIO * fast.sample_time:
         return None
-    each = told(slow, fast, names, channels or Channels())
+    each = shared_rows(slow, fast, names, channels or ChannelDeviations())
     clearest = max(each, key=lambda one: int(one.same.sum()), default=None)
     if clearest is None:
         return None
     runs = [(float(slow.time[a]), float(slow.time[b - 1])) for a, b in stretches(_taken(clearest))]
     rows = np.flatnonzero(clearest.same)
     at = (float(slow.time[rows[0]]), float(slow.time[rows[-1]]))
-    in_fast = _in_other(clearest.way, at)
+    in_fast = _in_other(clearest.alignment, at)
     if slow is not one:
-        runs = [_in_other(clearest.way, run) for run in runs][
-            :: 1 if clearest.way.rate > 0.0 else -1
+        runs = [_in_other(clearest.alignment, run) for run in runs][
+            :: 1 if clearest.alignment.rate > 0.0 else -1
         ]
     in_one, in_other = (at, in_fast) if slow is one else (in_fast, at)
     share = min(
@@ -206,7 +206,7 @@ def _in_other(way: Alignment, run: tuple[float, float]) -> tuple[float, float]:
     return min(first, last), max(first, last)
 
 
-def _taken(alignment: Told) -> Mask:
+def _taken(alignment: SharedRows) -> Mask:
     """Rows that two recordings share: those found to be the same, and all between them but for runs
     of three windows or more that differ.
     """

@@ -416,9 +416,9 @@ def _order(recording: Recording, rig: Rig) -> Iterator[str]:
                     for median in (recording.channels[name][rows], limit)
                 )
                 yield (
-                    f"{name} is above {source} for {100 * share:.0f} % of the time (medians {median} "
-                    f"and {other}); at most {100 * _ORDER_TIME_SHARE:.0f} % is allowed: are the "
-                    "two columns swapped, or one of their units wrong?"
+                    f"{name} is above {source} for {100 * share:.0f} % of the time (medians "
+                    f"{median} and {other}); at most {100 * _ORDER_TIME_SHARE:.0f} % is allowed: "
+                    "are the two columns swapped, or one of their units wrong?"
                 )
 
 

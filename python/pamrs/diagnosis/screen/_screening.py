@@ -246,18 +246,20 @@ def screen(
         Whether so much is left that a signature at one size tells little of another: each start is
         then looked at in several.
     """
-    looking = _Looking(problem, fitted, inflation, tangent_of(fitted, problem, inflation), strong)
+    search = _SignatureSearch(
+        problem, fitted, inflation, tangent_of(fitted, problem, inflation), strong
+    )
     for effect in effects:
         if not effect.at:
-            looking.seen.clear()
+            search.residuals_of.clear()
         starts = starts_of(effect, sealed=sealed)
         for form in dict.fromkeys(start.form for start in starts):
-            looking.at([start for start in starts if start.form == form])
-    return Screen(looking.tangent, looking.signatures, strong)
+            search.add_form([start for start in starts if start.form == form])
+    return Screen(search.tangent, search.signatures, strong)
 
 
 @dataclass(frozen=True, eq=False)
-class _Looking:
+class _SignatureSearch:
     """A fitted model at which signatures are taken.
 
     Attributes
@@ -277,7 +279,7 @@ class _Looking:
     everywhere : dict of values to Start
         Where the looks at an effect at every block of its kind ended, by where they began: those at
         one of these blocks begin there.
-    seen : dict of values to dict
+    residuals_of : dict of values to dict
         What it does there, by block and recording.
     """
 
@@ -288,30 +290,32 @@ class _Looking:
     strong: bool
     signatures: list[Signature] = field(default_factory=list)
     everywhere: dict[_Values, Start] = field(default_factory=dict)
-    seen: dict[_Values, dict[Key, Residual]] = field(default_factory=dict)
+    residuals_of: dict[_Values, dict[Key, Residual]] = field(default_factory=dict)
 
-    def at(self, starts: list[Start]) -> None:
+    def add_form(self, starts: list[Start]) -> None:
         """Add the signatures of one form of an effect, given all its starts."""
         first = starts[0]
         parameters = first.effect.info.form(first.form).parameters
         if any(p.scan for p in parameters):
-            for start in _scan_resonance(first, lambda start: self.try_(start, 1), self.signatures):
-                self.try_(start)
-                self.try_(_as_usual(start, first))
+            for start in _scan_resonance(
+                first, lambda start: self.add_signature(start, 1), self.signatures
+            ):
+                self.add_signature(start)
+                self.add_signature(_as_usual(start, first))
         elif any(p.role == "threshold" for p in parameters):
             before = len(self.signatures)
-            best = _find_thresholds(first, self.problem, lambda start: self.try_(start, 1))
+            best = _find_thresholds(first, self.problem, lambda start: self.add_signature(start, 1))
             self.signatures[before:] = [s for s in self.signatures[before:] if s[1] is best]
         else:
             for start in _moved_to_action(starts, self.problem, self.fitted.rig):
-                self.try_(start)
+                self.add_signature(start)
 
-    def try_(self, start: Start, looks: int | None = None) -> float:
+    def add_signature(self, start: Start, looks: int | None = None) -> float:
         """Add the signature of a start; return its gain in chi-square (minus infinity: none)."""
         there = self.everywhere.get(_values(start)) if start.effect.at else None
         tried, best = start if there is None else there.moved(start.effect), None
         for _ in range(_MOST_SIGNATURES if looks is None else looks):
-            shown = self._look(tried)
+            shown = self._signature_of(tried)
             if shown is None:
                 break
             best = shown
@@ -330,7 +334,7 @@ class _Looking:
                 break  # its bounds hold it
             tried = wanted
         if self.strong and start.scalable and looks is None and there is None:
-            others = [self._look(start.scaled(size)) for size in STRONG_SIZES]
+            others = [self._signature_of(start.scaled(size)) for size in STRONG_SIZES]
             # what a signature says of other sizes than its own is not relied on
             known = [shown for shown in (best, *others) if shown is not None]
             best = max(known, key=lambda shown: self._taken(shown[0]), default=None)
@@ -341,14 +345,14 @@ class _Looking:
             self.everywhere[_values(start)] = best[0][1]
         return -math.inf if best[1] is None else best[1].gain
 
-    def _look(self, start: Start) -> tuple[Signature, Score | None] | None:
+    def _signature_of(self, start: Start) -> tuple[Signature, Score | None] | None:
         """The signature of a start and its score; None where the model cannot be run so."""
         what = f"the signature of {start.effect}"
         left = self.problem.losses.part(what, lambda: self._changes(start))
         if left is None:
             return None
         if not start.effect.at:
-            self.seen[_values(start)] = left
+            self.residuals_of[_values(start)] = left
         rows, _ = stacked(self.problem, left, self.inflation)
         entry = (start.effect, start, rows - self.tangent.rows)
         return entry, next(iter(Screen(self.tangent, [entry]).scores()), None)
@@ -369,7 +373,7 @@ class _Looking:
         those of the effect everywhere.
         """
         term = start.effect
-        everywhere = self.seen.get(_values(start), {}) if term.at else {}
+        everywhere = self.residuals_of.get(_values(start), {}) if term.at else {}
         if not everywhere:
             return {}
         others = places_of(self.fitted.rig, term.id, self.problem.blocks)
@@ -427,7 +431,7 @@ def _moved_to_action(starts: list[Start], problem: Problem, rig: Rig) -> list[St
 
 
 def _scan_resonance(
-    start: Start, try_: Callable[[Start], float], signatures: list[Signature]
+    start: Start, add_signature: Callable[[Start], float], signatures: list[Signature]
 ) -> list[Start]:
     """Starts at the frequencies that gain most among many: what swings long has to be met within a
     few percent of its frequency.
@@ -445,7 +449,7 @@ def _scan_resonance(
         replace(start, free=start.free | {name: float(x)} | broad)
         for x in np.geomspace(*scanned.scan)
     ]
-    gains = [try_(one) for one in tried]
+    gains = [add_signature(one) for one in tried]
     del signatures[before:]
     order = sorted(range(len(tried)), key=lambda k: -gains[k])
     # the best and the best that is no neighbour of it
@@ -499,7 +503,7 @@ def _shows(start: Start, block: Block) -> bool:
 
 
 def _find_thresholds(
-    start: Start, problem: Problem, try_: Callable[[Start], float]
+    start: Start, problem: Problem, add_signature: Callable[[Start], float]
 ) -> Start | None:
     """The levels of a channel between which something switches: over the range that was seen, then
     closer and closer.
@@ -528,7 +532,7 @@ def _find_thresholds(
 
     levels = [low + (k + 0.5) * step for k in range(_THRESHOLD_LEVELS)]
     tried = [
-        (try_(s), a, b, s)
+        (add_signature(s), a, b, s)
         for a in levels
         for b in (*levels, high + step)
         if b > a
@@ -539,6 +543,6 @@ def _find_thresholds(
         step *= 0.5
         _, a, b, _ = best
         around = [(a - step, b), (a + step, b), (a, b - step), (a, b + step)]
-        tried = [(try_(s), c, d, s) for c, d in around if 0.0 < c < d for s in [at(c, d)]]
+        tried = [(add_signature(s), c, d, s) for c, d in around if 0.0 < c < d for s in [at(c, d)]]
         best = max([best, *tried], key=lambda t: t[0])
     return best[3]

@@ -138,7 +138,9 @@ def find_closure(
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
-    chosen = _select(_Stacked.of(problem, baseline, baseline, inflation), candidates, columns, {})
+    chosen = _select(
+        _StackedFit.of(problem, baseline, baseline, inflation), candidates, columns, {}
+    )
     first = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if first is None:
         return None
@@ -147,7 +149,7 @@ def find_closure(
         problem, baseline, first, autocorrelation, blocks, closures
     )
     second = _select(
-        _Stacked.of(problem, warm, first, autocorrelation), candidates, columns, first.values
+        _StackedFit.of(problem, warm, first, autocorrelation), candidates, columns, first.values
     )
     other = (
         None if second is None else _fitted(problem, nominal, warm, autocorrelation, second, say)
@@ -269,7 +271,7 @@ def _at_first_fit(
 
 
 @dataclass(frozen=True, eq=False)
-class _Stacked:
+class _StackedFit:
     """Stacked residuals of a fit, with what the baseline can do next to a closure.
 
     Attributes
@@ -293,7 +295,9 @@ class _Stacked:
     series: list[slice]
 
     @staticmethod
-    def of(problem: Problem, baseline: Fit, fitted: Fit, inflation: dict[str, float]) -> _Stacked:
+    def of(
+        problem: Problem, baseline: Fit, fitted: Fit, inflation: dict[str, float]
+    ) -> _StackedFit:
         """Residuals of a fit, sensitivities of the baseline it grew from."""
         rows, _ = stacked(problem, fitted.residuals, inflation)
         _, jacobian = stacked(problem, baseline.residuals, inflation)
@@ -312,7 +316,7 @@ class _Stacked:
                 series.append(slice(start, start + size))
                 recording.append(np.full(size, k))
                 start += size
-        return _Stacked(
+        return _StackedFit(
             rows,
             freedom,
             np.array([fitted.moved[name] for name in names]),
@@ -358,7 +362,7 @@ def _better(
     """
     misfits = [with_priors(problem, model, inflation) for model in models]
     least = models[int(np.argmin(misfits))]
-    frame = _Stacked.of(problem, models[0], least, inflation)
+    frame = _StackedFit.of(problem, models[0], least, inflation)
     samples = frame.independent(frame.rows)
     worth = [
         -samples * math.log(misfit) - len(model.effect_values) * _price(samples, among)
@@ -370,7 +374,7 @@ def _better(
 
 
 def _select(
-    frame: _Stacked,
+    frame: _StackedFit,
     candidates: list[_ShapedTerm],
     columns: Array,
     present: dict[str, float],
@@ -387,7 +391,7 @@ def _select(
 
     Parameters
     ----------
-    frame : _Stacked
+    frame : _StackedFit
         Residuals to explain and what the baseline can do.
     candidates : list of _ShapedTerm
         Terms.
@@ -412,7 +416,7 @@ def _select(
         q, _ = np.linalg.qr(np.concatenate([frame.freedom, np.eye(b)]))
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
-    crossed = _Crossed.of(frame, rows, unit)
+    crossed = _CrossValidation.of(frame, rows, unit)
     chosen = _Selection(candidates, target, wide, _LEAST_POWER)
     for k, candidate in enumerate(candidates):
         if candidate.name in present and usable[k] and chosen.power(k) > _LEAST_POWER:
@@ -487,7 +491,7 @@ class _Selection:
 
 
 def _solved(
-    frame: _Stacked,
+    frame: _StackedFit,
     candidates: list[_ShapedTerm],
     rows: Array,
     unit: Array,
@@ -534,7 +538,7 @@ def _pruned(
 
 
 @dataclass(frozen=True, eq=False)
-class _Crossed:
+class _CrossValidation:
     """Normal equations of baseline and terms by recording, to leave one out at a time.
 
     Attributes
@@ -549,10 +553,10 @@ class _Crossed:
     prior: Array
 
     @staticmethod
-    def of(frame: _Stacked, rows: Array, unit: Array) -> _Crossed:
+    def of(frame: _StackedFit, rows: Array, unit: Array) -> _CrossValidation:
         everything = np.concatenate([frame.freedom, unit, rows[:, None]], axis=1)
         parts = [everything[frame.recording == k] for k in np.unique(frame.recording)]
-        return _Crossed(np.array([part.T @ part for part in parts]), frame.moved)
+        return _CrossValidation(np.array([part.T @ part for part in parts]), frame.moved)
 
     def left_out(self, terms: Sequence[int]) -> float:
         """Misfit of each recording by the baseline and terms that the others ask for, summed; with
