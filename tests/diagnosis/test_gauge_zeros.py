@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.prepare import blocks_beside_tanks
+from pamrs.diagnosis.prepare import blocks_with_tanks
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import replay
@@ -84,7 +84,7 @@ def test_a_block_has_the_zeros_of_what_is_read_around_it() -> None:
     assert zeros(without)["supply"] == {supply, chamber}
     # the level of a tank that is simulated is free as it is
     lone = tuple(name for name in without if name != "supply_pressure")
-    (block,) = blocks_beside_tanks(rig, lone)
+    (block,) = blocks_with_tanks(rig, lone)
     assert (block.floating, supply in block.parameters) == (("supply_pressure",), False)
 
 

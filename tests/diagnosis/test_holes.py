@@ -96,7 +96,7 @@ def test_a_command_that_changes_in_a_hole_is_not_taken_for_physics(rig, made, ro
         assert one.rows.sum() > 0.75 * one.rows.size
     calm = holed(whole, *((at + 12, at + 12 + rows) for at in steps.tolist()))
     (prepared,) = problem_of(rig, [calm]).recordings
-    assert not prepared.unheard
+    assert not prepared.after_holes
 
 
 def test_a_wave_in_a_small_hole_is_bridged() -> None:

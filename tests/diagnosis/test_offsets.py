@@ -11,7 +11,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis.fit import Problem, with_offsets
-from pamrs.diagnosis.fit._offsets import _later, _missed, _moved_alike
+from pamrs.diagnosis.fit._offsets import _misfits, _moved_alike, _with_later_commands
 from pamrs.diagnosis.prepare import averaged, begun_alike
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
@@ -38,7 +38,7 @@ def test_a_gas_that_begins_warm_is_no_offset(skipped: float) -> None:
     every = problem(recordings)
     _, offsets = _moved_alike(every, RIG)
     assert offsets == {}
-    missed, count = _missed(every, RIG)[2]
+    missed, count = _misfits(every, RIG)[2]
     assert missed < 1.1 * count  # 4.4 and 1.4 where it has to begin as warm as the room
 
 
@@ -64,7 +64,7 @@ def test_a_log_beside_the_loop_has_its_commands_moved(late: bool) -> None:
     told = [float(re.search(r"act (\S+) of a sample of the log earlier", t)[1]) for t in said]
     assert told == ([pytest.approx(0.5, abs=0.1)] * 2 if late else [])
     for was, now in zip((fitted, held), moved, strict=True):
-        (before, count), (after, _) = _missed(was, RIG)[0], _missed(now, RIG)[0]
+        (before, count), (after, _) = _misfits(was, RIG)[0], _misfits(now, RIG)[0]
         assert after < 1.1 * count
         assert not late or before > after + 100.0
 
@@ -74,7 +74,7 @@ def test_what_was_moved_is_no_finer_than_a_pressure_tells() -> None:
     (one,) = problem([vented(RIG, "fit", 0)]).recordings
     changes = np.flatnonzero(np.diff(one.held["valve_command"])) + 1
     for share in (0.5, -0.5):
-        moved = _later(one, np.full(changes.size, share)).held["valve_command"]
+        moved = _with_later_commands(one, np.full(changes.size, share)).held["valve_command"]
         parts = moved.size // one.n
         assert parts == 32  # of 5 ms
         at = np.flatnonzero(np.diff(moved)) + 1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.prepare import said_of_slack
+from pamrs.diagnosis.prepare import notes_on_slack
 from pamrs.recordings import Recording
 from tests.diagnosis.asked import problem_of
 from tests.diagnosis.noisy import GAUGES, driven
@@ -30,18 +30,18 @@ def vented(true: pamrs.Rig, seed: int, role: str = "fit") -> Recording:
 def test_a_model_that_lags_where_its_muscle_is_slack_is_told() -> None:
     """Let down without air, the muscle pushed the mass: 40 mm ahead of the model."""
     problem = problem_of(LIGHT, [vented(PUSHING, k) for k in range(2)], "chamber", "load")
-    (told,) = said_of_slack(LIGHT, problem.blocks, problem.recordings)
+    (told,) = notes_on_slack(LIGHT, problem.blocks, problem.recordings)
     assert told.startswith("the model lags where a muscle is slack: length of r")
     off, left = (float(part.split(" mm")[0]) for part in told.partition(" up to ")[2].split("and "))
     assert off == pytest.approx(39.4, abs=1.0)
     assert left < 0.5
     assert "buckling_load (now 0 N)" in told
-    assert said_of_slack(PUSHING, problem.blocks, problem.recordings) == []
+    assert notes_on_slack(PUSHING, problem.blocks, problem.recordings) == []
 
 
 def test_nothing_is_told_of_a_plant_that_is_slack() -> None:
     problem = problem_of(LIGHT, [vented(LIGHT, 0)], "load")
-    assert said_of_slack(LIGHT, problem.blocks, problem.recordings) == []
+    assert notes_on_slack(LIGHT, problem.blocks, problem.recordings) == []
 
 
 @pytest.mark.slow

@@ -58,7 +58,7 @@ def slopes_at_first(path: np.ndarray) -> tuple[float, float]:
     for seed in range(12):
         prepared = recorded(seed, path)
         errors.append(
-            (prepared.signals["joint_angle"][1][0], prepared.begun("joint_angle", [0])[1][0])
+            (prepared.signals["joint_angle"][1][0], prepared.with_starts("joint_angle", [0])[1][0])
         )
     filtered, begun = np.sqrt(np.mean(np.square(errors), axis=0))
     return float(filtered), float(begun)
@@ -80,19 +80,23 @@ def test_a_joint_that_never_moves_begins_with_the_cubic_through_all_of_it() -> N
 def test_a_start_in_smooth_motion_is_that_of_the_motion(at: int) -> None:
     time = DT * np.arange(ROWS)
     prepared = recorded(3, 0.8 + 0.4 * np.sin(2.0 * time))
-    value, slope = (array[at] for array in prepared.begun("joint_angle", [at]))
+    value, slope = (array[at] for array in prepared.with_starts("joint_angle", [at]))
     assert value == pytest.approx(0.8 + 0.4 * np.sin(2.0 * time[at]), abs=5e-4)
     assert slope == pytest.approx(0.8 * np.cos(2.0 * time[at]), abs=0.03)
     others = np.arange(ROWS) != at
     np.testing.assert_array_equal(
-        prepared.begun("joint_angle", [at])[0][others], prepared.signals["joint_angle"][0][others]
+        prepared.with_starts("joint_angle", [at])[0][others],
+        prepared.signals["joint_angle"][0][others],
     )
 
 
 def test_a_start_that_no_cubic_fits_is_the_filters() -> None:
     time = DT * np.arange(ROWS)
     prepared = recorded(4, 0.8 + 0.2 * np.sign(np.sin(60.0 * time)))
-    assert prepared.begun("joint_angle", [500])[1][500] == prepared.signals["joint_angle"][1][500]
+    assert (
+        prepared.with_starts("joint_angle", [500])[1][500]
+        == prepared.signals["joint_angle"][1][500]
+    )
 
 
 def test_what_lies_beyond_a_hole_is_not_asked() -> None:
@@ -100,7 +104,7 @@ def test_what_lies_beyond_a_hole_is_not_asked() -> None:
     angle = np.where(time < 3.2, 0.5, 0.9 + 0.2 * (time - 3.2))
     prepared = recorded(5, angle)
     prepared.recording.mask["joint_angle"][625:640] = False
-    value, slope = (array[640] for array in prepared.begun("joint_angle", [640]))
+    value, slope = (array[640] for array in prepared.with_starts("joint_angle", [640]))
     assert value == pytest.approx(angle[640], abs=5e-4)
     assert slope == pytest.approx(0.2, abs=0.02)
 

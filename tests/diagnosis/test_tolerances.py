@@ -109,7 +109,7 @@ def test_a_joint_on_its_stop_begins_at_rest_whatever_its_first_samples_say() -> 
         residual(block, problem.core, prepared, [])  # keeps the starts that it finds
         found = begun_alike([block], problem.core, prepared, tolerances)
         starts = found.starts(block.window, block.drives)
-        return bool(found.at_rest), float(found.begun("joint_angle", starts)[1][0])
+        return bool(found.at_rest), float(found.with_starts("joint_angle", starts)[1][0])
 
     first, second = (begun(prepared) for prepared in problem.recordings)
     assert first == (True, 0.0)

@@ -41,15 +41,15 @@ from pamrs.diagnosis.prepare import (
     Unjudged,
     averaged_to_need,
     begun_alike,
-    blocks_beside_tanks,
+    blocks_with_tanks,
     check_sense,
+    notes_on_beginnings,
+    notes_on_own_values,
+    notes_on_slack,
+    notes_on_tanks,
     prepare,
-    said_of_beginnings,
-    said_of_own,
-    said_of_slack,
-    said_of_tanks,
+    tanks_without_gauge,
     unjudged_blocks,
-    unread_tanks,
     with_own_values,
     with_tanks,
 )
@@ -87,7 +87,7 @@ def _usable_share(block: Block, recordings: list[Prepared]) -> float:
     return float(sum(r.sum() for r in rows)) / sum(r.size for r in rows)
 
 
-def _unsettled(rig: Rig) -> list[str]:
+def _unknown_parameters(rig: Rig) -> list[str]:
     """Parameters of what moves that the rig file marks unknown and that no fit moves."""
     moving = ("muscle", "transmission", "joint", "arm", "link", "load")
     unknown = [name for name, parameter in rig.parameters.items() if not parameter.known]
@@ -115,7 +115,7 @@ def _in_range(name: str) -> Iterator[None]:
         ) from error
 
 
-def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
+def _regulators_in_noise(problem: Problem, rig: Rig) -> dict[str, str]:
     """Regulators whose droop cannot be judged, and why, by block: only the difference of two
     measured pressures shows their flow, and that is mostly noise.
 
@@ -223,9 +223,9 @@ def diagnose(
     chosen = DiagnosisSettings() if settings is None else settings
     ready = readied(case, chosen)
     case = ready.case
-    considered = _asked(case.rig, consider)
+    considered = _checked_suspicions(case.rig, consider)
     with _in_range(case.name):
-        diagnosis, ready = _answered(ready, chosen, considered, say)
+        diagnosis, ready = _answer_without_unfollowed(ready, chosen, considered, say)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     say(f"{case.name}: done", 1.0)
@@ -237,12 +237,12 @@ def diagnose(
     )
 
 
-def _answered(
+def _answer_without_unfollowed(
     ready: Ready, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...], say: Steps
 ) -> tuple[Diagnosis, Ready]:
     """Diagnose a case without recordings that its model cannot follow; return that case too."""
     try:
-        return _answer(ready, settings, considered, say), ready
+        return _diagnose_ready(ready, settings, considered, say), ready
     except Unfollowed as error:
         unfollowed = error
     why = f"the model cannot follow it ({unfollowed})"
@@ -250,10 +250,10 @@ def _answered(
     if not notes:
         raise unfollowed
     rest = replace(ready, case=case, suspected=[*notes, *ready.suspected])
-    return _answered(rest, settings, considered, say)
+    return _answer_without_unfollowed(rest, settings, considered, say)
 
 
-def _answer(
+def _diagnose_ready(
     ready: Ready, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...], say: Steps
 ) -> Diagnosis:
     """Diagnose a case that passed the checks before any fit."""
@@ -271,10 +271,10 @@ def _answer(
         diagnosis = misread_diagnosis(case, inner, misread, unjudged, errors)
     else:
         shifted = part(
-            "the search for offsets of commands", lambda: _on_time(inner, outer, case.rig)
+            "the search for offsets of commands", lambda: _with_offsets(inner, outer, case.rig)
         )
         inner, outer, moved = shifted or (inner, outer, [])
-        stated, judged, unjudged = _physics(case, inner, outer, unjudged, say)
+        stated, judged, unjudged = _diagnose_physics(case, inner, outer, unjudged, say)
         what = "the look at other laws of the rig"
         diagnosis = inner.losses.part(
             what, lambda: _under_best_law(case, considered, inner, stated), stated
@@ -297,13 +297,13 @@ def _answer(
 
 def _case_of(case: Any, data: Any, rig: Any, *, allow_outside: bool) -> Case:
     """The case that the caller means, with the model to begin from."""
-    recorded = _recorded(case, data, allow_outside=allow_outside)
+    recorded = _case_with_own_model(case, data, allow_outside=allow_outside)
     if rig is None:
         return recorded
     return recorded.with_rig(rig) if isinstance(rig, Rig) else recorded.with_rig(load_rig(rig), rig)
 
 
-def _recorded(case: Any, data: Any, *, allow_outside: bool) -> Case:
+def _case_with_own_model(case: Any, data: Any, *, allow_outside: bool) -> Case:
     """The case that the caller means, with its own model."""
     if data is not None:
         model = case if isinstance(case, (Rig, Case)) else load_rig(case)
@@ -316,7 +316,7 @@ def _recorded(case: Any, data: Any, *, allow_outside: bool) -> Case:
     return case if isinstance(case, Case) else load_case(case, allow_outside=allow_outside)
 
 
-def _physics(
+def _diagnose_physics(
     case: Case, inner: Problem, outer: Problem, unjudged: list[Unjudged], say: Steps
 ) -> tuple[Diagnosis, Problem, list[Unjudged]]:
     """Diagnose physics: the result, recordings with judged blocks, and unjudged blocks."""
@@ -327,9 +327,9 @@ def _physics(
     inner, outer = _judged_only(inner, outer, groups)
     missed = [b for group in groups if group.mismatch is not None for b in group.blocks]
     slack = inner.losses.part(
-        "the look at slack muscles", lambda: said_of_slack(case.rig, missed, inner.recordings), []
+        "the look at slack muscles", lambda: notes_on_slack(case.rig, missed, inner.recordings), []
     )
-    unsettled = _unsettled(case.rig) if motion else []
+    unsettled = _unknown_parameters(case.rig) if motion else []
     if unsettled:
         groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
     say("putting the answer together", _JUDGED[1])
@@ -385,12 +385,12 @@ def _under_best_law(
 
     def divided(rig: Rig) -> tuple[Problem, Problem, list[Unjudged]]:
         fitted, held_out, unjudged, _ = _problems(case.with_rig(rig), inner.settings, considered)
-        return *_on_time(fitted, held_out, rig)[:2], unjudged
+        return *_with_offsets(fitted, held_out, rig)[:2], unjudged
 
     best, quiet = stated, Steps(None, within=_JUDGED)
     for choice, recordings in promising_laws(case.rig, inner, stated, divided):
         with suppress(PamrsError):  # a rig that these recordings cannot be of
-            other, _, _ = _physics(case.with_rig(choice.rig), *recordings, quiet)
+            other, _, _ = _diagnose_physics(case.with_rig(choice.rig), *recordings, quiet)
             best = under(choice, other, stated) if is_better(other, best) else best
     return best
 
@@ -418,7 +418,7 @@ def _missing(
 
 def _limits(conclusion: Conclusion, inner: Problem, outer: Problem) -> list[Limit]:
     """Sizes from which the recordings would have shown effects, and distinguished them."""
-    every, baseline = _together(inner, outer), conclusion.models.baseline
+    every, baseline = _all_recordings(inner, outer), conclusion.models.baseline
     beyond_noise = {
         b.name: beyond(error.after, error.noise, conclusion.own_errors[b.channel])
         for b in inner.blocks
@@ -429,7 +429,7 @@ def _limits(conclusion: Conclusion, inner: Problem, outer: Problem) -> list[Limi
     )
 
 
-def _together(inner: Problem, outer: Problem) -> Problem:
+def _all_recordings(inner: Problem, outer: Problem) -> Problem:
     """All recordings, of every role."""
     return replace(inner, recordings=[p for part in _by_role(inner, outer).values() for p in part])
 
@@ -500,9 +500,9 @@ def missing_input(
     shortened, _ = averaged_to_need(ready.case.recordings, ready.blocks, name, chosen)
     with _in_range(name):
         inner, outer, _, _ = _problems(replace(ready.case, recordings=shortened), chosen, ())
-        inner, outer, _ = _on_time(inner, outer, ready.case.rig)
+        inner, outer, _ = _with_offsets(inner, outer, ready.case.rig)
         roles = _by_role(inner, outer)
-        every = _together(inner, outer)
+        every = _all_recordings(inner, outer)
         if block is not None:
             by_name = {b.name: b for b in inner.blocks}
             if block not in by_name:
@@ -533,13 +533,13 @@ def _judged_only(
     return fitted, fitted if outer is inner else replace(outer, blocks=fitted.blocks)
 
 
-def _on_time(inner: Problem, outer: Problem, rig: Rig) -> tuple[Problem, Problem, list[str]]:
+def _with_offsets(inner: Problem, outer: Problem, rig: Rig) -> tuple[Problem, Problem, list[str]]:
     """Recordings, fitted and held out, with commands at the times they acted, and notes on that."""
     shifted, notes = with_offsets([inner] if outer is inner else [inner, outer], rig)
     return shifted[0], shifted[-1], notes
 
 
-def _asked(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, ...]:
+def _checked_suspicions(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, ...]:
     """Hypotheses that the caller asks for, checked, each once."""
     if isinstance(consider, str):
         raise ValueError(
@@ -581,8 +581,8 @@ def _problems(
     fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
     held_out = [prepare(r, rig, settings) for r in case.held_out if case.fit]
     channels, least = case.channels, settings.least_block_share
-    blocks, core = blocks_beside_tanks(rig, channels), core_rig(rig)
-    tanks = unread_tanks(rig, channels)
+    blocks, core = blocks_with_tanks(rig, channels), core_rig(rig)
+    tanks = tanks_without_gauge(rig, channels)
     fitted, held_out = (
         [with_tanks(rig, core, p, tanks) for p in part] for part in (fitted, held_out)
     )
@@ -607,7 +607,7 @@ def _problems(
         for b in blocks
         if (share := min(_usable_share(b, part) for part in (fitted, held_out) if part)) < least
     }
-    start_notes = said_of_beginnings([b for b in blocks if b.name in thin], [*fitted, *held_out])
+    start_notes = notes_on_beginnings([b for b in blocks if b.name in thin], [*fitted, *held_out])
     every = blocks
     blocks = [b for b in blocks if b.name not in thin]
     if thin and not blocks:
@@ -618,7 +618,7 @@ def _problems(
             + "".join(f"; {text}" for text in start_notes)
         )
     inner = Problem(blocks, fitted, core, settings, considered=considered)
-    drowned = _drowned(inner, rig)
+    drowned = _regulators_in_noise(inner, rig)
     left_out = [b for b in every if b.name in thin or b.name in drowned]
     inner = replace(inner, blocks=[b for b in blocks if b.name not in drowned])
     if not inner.blocks:
@@ -630,7 +630,7 @@ def _problems(
     } | drowned
     unjudged = [*without, *(Unjudged(b.name, b.covers, why[b.name]) for b in left_out)]
     outer = replace(inner, recordings=held_out) if held_out else inner
-    start_notes += said_of_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
-    start_notes += said_of_tanks(rig, inner.blocks, inner.recordings)
-    start_notes += said_of_own([*fitted, *held_out])
+    start_notes += notes_on_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
+    start_notes += notes_on_tanks(rig, inner.blocks, inner.recordings)
+    start_notes += notes_on_own_values([*fitted, *held_out])
     return inner, outer, unjudged, start_notes

@@ -13,15 +13,15 @@ from pamrs.diagnosis.fit import holdable, without_passing
 from pamrs.diagnosis.prepare import (
     Block,
     at_ambient,
-    blocks_beside_tanks,
+    blocks_with_tanks,
     check_plausible,
     implausible,
     noted_units,
-    own_of_rig,
     suspected_units,
     uncommanded,
     unusable,
     varying,
+    with_declared_values,
     without_copies,
     without_dead_commands,
     without_impossible,
@@ -88,7 +88,7 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
         If recordings cannot be of this rig (units, swapped columns, dead sensors), or surround no
         block of it.
     """
-    case = replace(case, recordings=own_of_rig(case.rig, case.recordings))
+    case = replace(case, recordings=with_declared_values(case.rig, case.recordings))
     _check_rig(case)
     doubts = [*suspected_units(case), *noted_units(case)]
     try:
@@ -109,7 +109,7 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
     case, clipped, copies, masked = _sound(case, settings)
     case, empty = left_out(case, lambda r: unusable(r, case.rig, core, settings))
     suspected = [*lacking_commands, *implausible_ones, *empty]
-    blocks = blocks_beside_tanks(case.rig, case.channels)
+    blocks = blocks_with_tanks(case.rig, case.channels)
     if not blocks:
         message = (
             f"case {case.name!r}: its channels ({', '.join(case.channels)}) do not surround any "
@@ -166,7 +166,7 @@ def _check_rig(case: Case) -> None:
 def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
     """Case with the rig as far as it is known before any fit, and sentences on that."""
     rig, notes = at_ambient(case.rig, case.recordings, settings)
-    every_note = [*notes, *_said_of_held(rig), *_said_of_inlets(rig, case.channels)]
+    every_note = [*notes, *_notes_on_held(rig), *_notes_on_inlets(rig, case.channels)]
     return replace(case, rig=without_passing(rig)), every_note
 
 
@@ -181,7 +181,7 @@ def _sound(
     return replace(case, recordings=recordings), clipped, copies, [*masked, *poor]
 
 
-def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
+def _notes_on_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
     """Tanks in front of regulators that nobody measured, in words."""
     notes = []
     for name, ports in rig.ports("supply").items():
@@ -198,7 +198,7 @@ def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
     return notes
 
 
-def _said_of_held(rig: Rig) -> list[str]:
+def _notes_on_held(rig: Rig) -> list[str]:
     """Sentences on effects that the model holds already, and on those that it cannot hold."""
 
     def named(entry: dict[str, Any]) -> str:

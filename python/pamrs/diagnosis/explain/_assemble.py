@@ -35,12 +35,12 @@ from pamrs.diagnosis.model import (
     DETERMINED_SHARE,
     Conclusion,
     Models,
+    notes_on_constants,
     owners_of_effects,
     owners_of_parameters,
-    said_of_constants,
     with_std,
 )
-from pamrs.diagnosis.prepare import Unjudged, said_of_warm_starts
+from pamrs.diagnosis.prepare import Unjudged, notes_on_warm_starts
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.effects import CATALOGUE, Hypothesis, Term, effect_of
 from pamrs.findings import (
@@ -113,9 +113,9 @@ def assemble(
     if held is not fitted:
         stages.insert(0, (held, conclusion.outside))
     effects = _effects(judged, verdict, fitted)
-    constants = said_of_constants(conclusion.runs or [], [effect.id for effect in effects])
+    constants = notes_on_constants(conclusion.runs or [], [effect.id for effect in effects])
     warm = {**conclusion.inside["after"], **conclusion.outside["after"]}
-    start_notes = said_of_warm_starts(fitted.blocks, [*fitted.recordings, *held.recordings], warm)
+    start_notes = notes_on_warm_starts(fitted.blocks, [*fitted.recordings, *held.recordings], warm)
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
@@ -141,7 +141,7 @@ def assemble(
             nominal,
             conclusion.errors,
         ),
-        wrong_parameters=_wrong(models, fitted, conclusion.table),
+        wrong_parameters=_wrong_parameters(models, fitted, conclusion.table),
         measured=list(case.channels),
         residuals=_block_table(groups),
         tried=_tried_sets(groups),
@@ -162,7 +162,7 @@ def assemble(
     diagnosis = replace(diagnosis, warnings=[*constants, *notes, *start_notes])
     picture = _picture(diagnosis.answer.block, conclusion, fitted)
     where = words.where(diagnosis.answer, fitted, judged, picture, conclusion.errors)
-    return _worded(replace(answered(diagnosis), where=where), case, judged, forms)
+    return _with_text(replace(answered(diagnosis), where=where), case, judged, forms)
 
 
 def answered(diagnosis: Diagnosis) -> Diagnosis:
@@ -189,7 +189,7 @@ def _picture(located: str | None, conclusion: Conclusion, fitted: Problem) -> Pi
     )
 
 
-def _worded(
+def _with_text(
     diagnosis: Diagnosis,
     case: Case,
     judged: list[Judged],
@@ -331,7 +331,7 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
     ]
 
 
-def _wrong(
+def _wrong_parameters(
     models: Models, problem: Problem, table: dict[str, ChannelError]
 ) -> list[WrongParameter]:
     """Parameters that the rig file is wrong about: its value, the one that the recordings ask for,

@@ -158,13 +158,13 @@ def unexplained(
             continue
         suspects = {b.name: b for b in j.group.suspects}
         for mismatch in (m for m in entry.mismatch if m.block in suspects):
-            shown = _left(mismatch, entry.verdict, stages, errors)
+            shown = _stage_with_excess(mismatch, entry.verdict, stages, errors)
             if shown is None:
                 continue
             stage, problem, residual, role = shown
             error = errors[role][mismatch.channel]
             size = error[stage]
-            share, interval = _rest(mismatch.block, terms)
+            share, interval = _share_unexplained(mismatch.block, terms)
             entries_found.append(
                 Unexplained(
                     mismatch.block,
@@ -183,7 +183,7 @@ def unexplained(
     return sorted(entries_found, key=lambda u: -(u.noises or 0.0))
 
 
-def _left(
+def _stage_with_excess(
     mismatch: BlockMismatch,
     verdict: str,
     stages: list[tuple[Problem, Stages]],
@@ -201,7 +201,9 @@ def _left(
     return None
 
 
-def _rest(block: str, terms: list[BudgetTerm]) -> tuple[float | None, list[float] | None]:
+def _share_unexplained(
+    block: str, terms: list[BudgetTerm]
+) -> tuple[float | None, list[float] | None]:
     """Share of a block's excess that no name takes, and its interval; None without a budget."""
     of_block = [t for t in terms if t.block == block]
     rest = [t for t in of_block if t.kind in ("form", "unexplained")]

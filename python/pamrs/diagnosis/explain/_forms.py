@@ -11,7 +11,7 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.diagnosis.fit import Fit, Problem
-from pamrs.diagnosis.prepare import Block, begun
+from pamrs.diagnosis.prepare import Block, signals_at_starts
 from pamrs.effects import CLOSURE_OF, CLOSURE_TERMS, EFFECTS, MEMORY_OF, WORDS, ClosureTerm
 from pamrs.errors import DiagnosisError
 from pamrs.findings import Form
@@ -93,7 +93,7 @@ def _parts(fitted: Fit, problem: Problem, block: Block, closure: str) -> dict[st
             prepared.dt,
             default_step(prepared.dt, longest=block.step),
             starts,
-            begun(block, prepared, starts),
+            signals_at_starts(block, prepared, starts),
             prepared.n,
         )
         rows.append(terms[fitted.residuals[block.name, prepared.recording.name].rows])

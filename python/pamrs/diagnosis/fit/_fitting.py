@@ -303,7 +303,7 @@ def residuals(
             full[:, list(names).index(name)] = (block_residual.value - shifted_value) / steps[name]
         return replace(block_residual, jacobian=full)
 
-    return _everywhere(problem, residual_of)
+    return _for_every_block(problem, residual_of)
 
 
 def _steps(rig: Rig, cores: Mapping[str, _core.Rig], names: Sequence[str]) -> dict[str, float]:
@@ -333,7 +333,7 @@ def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> l
         return list(pool.map(function, items))
 
 
-def _everywhere(problem: Problem, one: Callable[[Block, Prepared], Residual]) -> Residuals:
+def _for_every_block(problem: Problem, one: Callable[[Block, Prepared], Residual]) -> Residuals:
     """Apply a function to every block and recording, two at a time.
 
     The longest come first, so that no processor is left alone with one of them at the end.
@@ -574,7 +574,7 @@ def changes(
             return known[block.name, prepared.recording.name]
         return replace(before, value=change(block, core, prepared, before), jacobian=None)
 
-    return _everywhere(problem, changed)
+    return _for_every_block(problem, changed)
 
 
 def _away_from_usual(

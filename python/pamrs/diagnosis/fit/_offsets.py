@@ -84,11 +84,11 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
     whole = replace(first, blocks=blocks, recordings=recordings)
     try:
         # offsets are small and linear, parameters inside wide tolerances are not
-        near = _near(first, blocks, nominal)
+        near = _fitted_model(first, blocks, nominal)
         moved, offsets = _moved_alike(whole, near)
         if moved:
             moved |= _moved_each(whole, near, list(moved))
-            moved = _that_pay(first, whole, near, moved)
+            moved = _worth_moving(first, whole, near, moved)
     except SimulationError:
         return list(problems), []  # the fit says what cannot be predicted
     notes = [
@@ -105,13 +105,13 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
     ], notes
 
 
-def _near(problem: Problem, blocks: Sequence[Block], nominal: Rig) -> Rig:
+def _fitted_model(problem: Problem, blocks: Sequence[Block], nominal: Rig) -> Rig:
     """The model with its parameters fitted to some blocks."""
     part = replace(problem, blocks=list(blocks))
     return fit(part, nominal, (), {}, {b.name: 1.0 for b in blocks}).rig
 
 
-def _that_pay(
+def _worth_moving(
     first: Problem, whole: Problem, near: Rig, moved: dict[int, Prepared]
 ) -> dict[int, Prepared]:
     """Moved recordings of which a fit leaves less than unmoved, and little but noise: where
@@ -119,10 +119,10 @@ def _that_pay(
     """
     by_name = {whole.recordings[k].recording.name: p for k, p in moved.items()}
     fitted = [by_name.get(p.recording.name, p) for p in first.recordings]
-    after = _near(replace(first, recordings=fitted), whole.blocks, near)
+    after = _fitted_model(replace(first, recordings=fitted), whole.blocks, near)
     recordings = [moved.get(k, p) for k, p in enumerate(whole.recordings)]
     with_moved = replace(whole, recordings=recordings)
-    missed, rest = _missed(whole, near), _missed(with_moved, after)
+    missed, rest = _misfits(whole, near), _misfits(with_moved, after)
     return {
         k: p
         for k, p in moved.items()
@@ -130,7 +130,7 @@ def _that_pay(
     }
 
 
-def _missed(problem: Problem, rig: Rig) -> list[tuple[float, int]]:
+def _misfits(problem: Problem, rig: Rig) -> list[tuple[float, int]]:
     """Sum of squares of each recording's residuals in noise levels, and their number."""
     block_residuals, sums = residuals(problem, rig, []), []
     for prepared in problem.recordings:
@@ -148,7 +148,7 @@ def _changes(prepared: Prepared) -> Rows:
     return np.flatnonzero(np.any(np.diff(each) != 0.0, axis=0)) + 1
 
 
-def _later(prepared: Prepared, shares: Array) -> Prepared:
+def _with_later_commands(prepared: Prepared, shares: Array) -> Prepared:
     """Recording whose changes of a command act given shares of a sample of the log later."""
     at = _changes(prepared)
     size = next(iter(prepared.held.values())).size
@@ -172,7 +172,7 @@ def _moved_alike(problem: Problem, nominal: Rig) -> tuple[dict[int, Prepared], d
         for k, p in enumerate(problem.recordings)
         if (at := _changes(p)).size
     ]
-    best, spread = _fitted(problem, nominal, all_of)
+    best, spread = _fit_offsets(problem, nominal, all_of)
     offsets = {
         change.recording: float(offset)
         for change, offset, std in zip(all_of, best, spread, strict=True)
@@ -180,7 +180,7 @@ def _moved_alike(problem: Problem, nominal: Rig) -> tuple[dict[int, Prepared], d
     }
     recordings = problem.recordings
     return {
-        k: _later(recordings[k], np.full(_changes(recordings[k]).size, offset))
+        k: _with_later_commands(recordings[k], np.full(_changes(recordings[k]).size, offset))
         for k, offset in offsets.items()
     }, offsets
 
@@ -192,14 +192,16 @@ def _moved_each(problem: Problem, nominal: Rig, those: list[int]) -> dict[int, P
     each = [_Change(k, np.array([i])) for k, n in few.items() for i in range(n)]
     if not each:
         return {}
-    best, _ = _fitted(problem, nominal, each)
+    best, _ = _fit_offsets(problem, nominal, each)
     shares = {k: np.zeros(n) for k, n in few.items()}
     for one, offset in zip(each, best, strict=True):
         shares[one.recording][one.which] = np.clip(offset, -_MOST_OFFSET, _MOST_OFFSET)
-    return {k: _later(problem.recordings[k], shares_of) for k, shares_of in shares.items()}
+    return {
+        k: _with_later_commands(problem.recordings[k], shares_of) for k, shares_of in shares.items()
+    }
 
 
-def _fitted(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[Array, Array]:
+def _fit_offsets(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[Array, Array]:
     """Offsets in samples of the log, and their standard deviations, by a linear fit together with
     the parameters inside their tolerances.
     """
@@ -223,7 +225,7 @@ def _fitted(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[
                 shares = np.zeros(_changes(prepared).size)
                 shares[which] = 0.5
                 later, sooner = (
-                    change(block, core, _later(prepared, sign * shares), base)
+                    change(block, core, _with_later_commands(prepared, sign * shares), base)
                     for sign in (1.0, -1.0)
                 )
                 slopes[:, column] = sooner - later  # residuals go the other way

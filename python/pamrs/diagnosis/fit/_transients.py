@@ -146,11 +146,13 @@ def fit_events(
             shaken = shaken or VibrationResponse.of(effect, problem, rig, base, inflation)
             events = shaken.best(form.name)
         elif form.own:
-            events = _drifting(effect, form.name, problem, rig, base, inflation)
+            events = _sizes_by_recording(effect, form.name, problem, rig, base, inflation)
         else:
             usual = usual_events if last is None else last.events
             events = usual if usual is None or form is forms[0] else _in_form(usual, form.name)
-        joint = None if events is None else _jointly(events, problem, nominal, baseline, inflation)
+        joint = (
+            None if events is None else _fit_jointly(events, problem, nominal, baseline, inflation)
+        )
         if joint is not None and (
             last is None or 2.0 * (last.cost - joint.cost) > _LEAST_EVENT_GAIN
         ):
@@ -236,7 +238,7 @@ def look_for_events(
         if periodic:
             return None if shaken is None else replace(shaken, values={name: shaken.values[name]})
         if effect.info.own:
-            return _drifting(effect, form, alone, rig, base, inflation, known)
+            return _sizes_by_recording(effect, form, alone, rig, base, inflation, known)
         of_recording = {key: r for key, r in base.items() if key[1] == name}
         first_values = _scan(effect, alone, prepared, rig, of_recording, inflation, size, stopped)
         events = Events(effect, {name: first_values}) if first_values else None
@@ -247,7 +249,7 @@ def look_for_events(
         events = start_in(alone, prepared)
         if events is None:
             return None
-        return _fitted(events, alone, prepared, rig, inflation, known, stopped)
+        return _fit_alone(events, alone, prepared, rig, inflation, known, stopped)
 
     stopped = Event()
     with ThreadPoolExecutor(max_workers=2) as pool:
@@ -264,7 +266,7 @@ def look_for_events(
     return Events(effect, values, form) if values else None
 
 
-def _drifting(
+def _sizes_by_recording(
     effect: Term,
     form: str,
     problem: Problem,
@@ -317,10 +319,12 @@ def _scan(
     times = np.arange(_FIRST_TIME, length - _LAST_TIME, _SPACING)
     rows, _ = stacked(problem, base, inflation)
     signatures: dict[float, Array] = {}
-    for group in _apart(times, slots):
+    for group in _spaced_groups(times, slots):
         if stopped.is_set():
             return {}
-        values = _numbered([(typical if size is None else size, float(t)) for t in group], effect)
+        values = _event_parameters(
+            [(typical if size is None else size, float(t)) for t in group], effect
+        )
         try:
             moved, _ = stacked(
                 problem,
@@ -367,7 +371,7 @@ def _scan(
         (float(factor) * (typical if size is None else size), t)
         for factor, t in zip(sizes, chosen, strict=True)
     ]
-    return _numbered(sorted(events, key=lambda c: c[1]), effect) if events else {}
+    return _event_parameters(sorted(events, key=lambda c: c[1]), effect) if events else {}
 
 
 def _gain(rest: Array, signature: Array, *, scaled: bool) -> float:
@@ -379,7 +383,7 @@ def _gain(rest: Array, signature: Array, *, scaled: bool) -> float:
     return along**2 / power if scaled else -2.0 * along - power
 
 
-def _apart(times: Array, slots: int) -> list[list[float]]:
+def _spaced_groups(times: Array, slots: int) -> list[list[float]]:
     """Times in groups that can be tried in one simulation, far from each other."""
     if slots == 1:
         return [[float(t)] for t in times]
@@ -387,7 +391,7 @@ def _apart(times: Array, slots: int) -> list[list[float]]:
     return [[float(t) for t in times[k::stride]] for k in range(stride)]
 
 
-def _numbered(events: list[tuple[float, float]], effect: Term) -> dict[str, float]:
+def _event_parameters(events: list[tuple[float, float]], effect: Term) -> dict[str, float]:
     """Parameters of a few events of one recording, by their sizes and times."""
     values: dict[str, float] = {}
     for (size, time), parameters in zip(events, events_of(effect), strict=False):
@@ -398,7 +402,7 @@ def _numbered(events: list[tuple[float, float]], effect: Term) -> dict[str, floa
     return values | {p.name: _first_value(p) for p in effect.info.with_role("rise") if values}
 
 
-def _fitted(
+def _fit_alone(
     events_start: Events,
     alone: Problem,
     prepared: Prepared,
@@ -450,7 +454,7 @@ def _limits(effect: Term, parameter: str, prepared: Prepared) -> tuple[float, fl
     return limits.get(_first_of(effect, parameter).role, size)
 
 
-def _jointly(
+def _fit_jointly(
     events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
 ) -> Fit | None:
     """Fit baseline and events of every recording together, a changed mass being the same in all;

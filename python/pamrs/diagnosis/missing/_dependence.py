@@ -90,7 +90,7 @@ class _JoinedInput:
         values: Array = columns @ np.linalg.solve(normal, weighted.T @ self.value[rows])
         return values
 
-    def told(self, columns: Array) -> float:
+    def share_predicted(self, columns: Array) -> float:
         """Share of the input's square that a function predicts in stretches not fitted to."""
         guess = np.empty_like(self.value)
         for k in range(_FOLDS):
@@ -242,18 +242,20 @@ def _explained(missing: MissingInput) -> tuple[str, float, str]:
     """
     along = _JoinedInput.of(missing.recordings, [*missing.units])
     candidates = _candidates(along, missing.position, missing.rate)
-    shares = {name: along.told(columns) for name, columns in candidates.items()}
+    shares = {name: along.share_predicted(columns) for name, columns in candidates.items()}
     best = max(shares.values())
     name = next(n for n, share in shares.items() if share > best - _CLEARER)
     if best < _LEAST_TOLD:
         size = _shown(along.mean(np.abs(along.value), along.weight > 0.0), missing.unit)
-        named = _taken(missing, along)
+        named = _share_of_names(missing, along)
         return "", max(0.0, best), f"{size}{named or ', and no single argument explains it'}"
     columns = candidates[name]
     others = [n for n in missing.units if n not in (name, "time", missing.rate)]
     others = [n for n in others if not (name == "strokes" and n == missing.position)]
     deeper = {
-        n: along.told(np.hstack([columns, columns * _scaled(along.arguments[n])[:, None]]))
+        n: along.share_predicted(
+            np.hstack([columns, columns * _scaled(along.arguments[n])[:, None]])
+        )
         for n in others
     }
     beside = max(deeper, key=lambda n: deeper[n], default="")
@@ -261,12 +263,12 @@ def _explained(missing: MissingInput) -> tuple[str, float, str]:
         beside = ""
     sentence = _sentence(missing, along, name, along.fitted(columns, along.weight > 0.0))
     if beside:
-        sentence += _beside(missing, along, name, beside)
+        sentence += _on_second_argument(missing, along, name, beside)
     argument = {"": "time", "strokes": missing.position}.get(name, name)
-    return argument, min(1.0, max(shares[name], 0.0)), sentence + _taken(missing, along)
+    return argument, min(1.0, max(shares[name], 0.0)), sentence + _share_of_names(missing, along)
 
 
-def _taken(missing: MissingInput, along: _JoinedInput) -> str:
+def _share_of_names(missing: MissingInput, along: _JoinedInput) -> str:
     """Words on the share of an input's square that named effects take; empty where it is small."""
     laws = [recording.law for recording in missing.recordings if recording.law is not None]
     if len(laws) < len(missing.recordings):
@@ -330,7 +332,7 @@ def _sentence(missing: MissingInput, along: _JoinedInput, name: str, fit: Array)
     return f"{size_in_words}, {'growing' if trend > 0.0 else 'falling'} with the {noun}"
 
 
-def _beside(missing: MissingInput, along: _JoinedInput, name: str, beside: str) -> str:
+def _on_second_argument(missing: MissingInput, along: _JoinedInput, name: str, beside: str) -> str:
     """Dependence of the input's size on a second argument, in words."""
     rate = np.abs(along.arguments[missing.rate])
     rows = rate > np.median(rate) if name == missing.rate else along.weight > 0.0

@@ -107,13 +107,13 @@ class _Windows:
         places = [a + self.spacing * np.arange(k) for a, k in zip(self.starts, counts, strict=True)]
         self.time: Array = prepared.dt * np.concatenate(places).astype(np.float64)
         self.heights = at(self.time)
-        self.means, counted, self.response = self._begun()
+        self.means, counted, self.response = self._first_run()
         first = bins_of(prepared) * np.arange(self.means.size)
         window = np.searchsorted(self.starts, first, side="right") - 1
         within = [window == k for k in range(len(lengths))]
         self.bins = [np.flatnonzero(inside & (counted > 0)) for inside in within]
 
-    def _begun(self) -> tuple[Array, Array, Array]:
+    def _first_run(self) -> tuple[Array, Array, Array]:
         """The first run, with less of the input where the model leaves its range with all of it."""
         for _ in range(_HALVINGS):
             try:
@@ -168,7 +168,7 @@ class _Windows:
             which[a:b, :count] = knots.start + np.arange(count)
         return hats, which
 
-    def left(self, means: Array) -> Array:
+    def mean_squares(self, means: Array) -> Array:
         """Mean square of the residual in each window."""
         return np.array([float(np.mean(means[i] ** 2)) if i.size else 0.0 for i in self.bins])
 
@@ -202,7 +202,7 @@ class _Windows:
         """Make Gauss-Newton steps in each window as long as they pay."""
         length = np.ones(len(self.starts))
         for step in range(steps):
-            before = self.left(self.means)
+            before = self.mean_squares(self.means)
             todo = ((before > _ENOUGH) | (step < _ALWAYS)) & (length > _LEAST_NEWTON_STEP)
             if not todo.any():
                 return
@@ -216,7 +216,7 @@ class _Windows:
             except SimulationError:
                 length *= _SHORTER
                 continue
-            better = todo & (self.left(means) < before)
+            better = todo & (self.mean_squares(means) < before)
             length = np.where(todo & ~better, _SHORTER * length, np.minimum(1.0, 2.0 * length))
             for k in np.flatnonzero(better).tolist():
                 self.take(k, heights, means, response)
@@ -278,9 +278,9 @@ def reconstruct(
     windows = _Windows(block, core, prepared, noise, _nothing)
     first = [windows.means[i] for i in windows.bins]
     windows.improve(_FIRST_STEPS)
-    if (windows.left(windows.means) > _FAR**2).any() and has_port(block):
+    if (windows.mean_squares(windows.means) > _FAR**2).any() and has_port(block):
         _from_short(windows)
-    followed = windows.left(windows.means) <= _FAR**2
+    followed = windows.mean_squares(windows.means) <= _FAR**2
     _, std = windows.most_probable()
     inside = [
         np.arange(knots.start, knots.stop)[windows.time[knots] < prepared.dt * end]
@@ -314,6 +314,6 @@ def _from_short(windows: _Windows) -> None:
         grown = _Windows(shorter, windows.core, prepared, windows.noise, at)
         grown.improve(steps)
         at = _interpolated(grown.time, grown.heights)
-    better = grown.left(grown.means) < windows.left(windows.means)
+    better = grown.mean_squares(grown.means) < windows.mean_squares(windows.means)
     for k in np.flatnonzero(better).tolist():
         windows.take(k, grown.heights, grown.means, grown.response)

@@ -86,13 +86,13 @@ def missing_input_of(
         for prepared in each:
             name = prepared.recording.name
             noise = noise_level[block.name, name].noise
-            followed = _followed(block, core, prepared, noise)
+            followed = _reconstructed(block, core, prepared, noise)
             if followed is None:
                 continue
             # a force shortens the muscle, and its length is what is measured
             sign = -1.0 if channel_of(block.name) == "load" else 1.0
             law = None
-            rest = None if named is None else _followed(block, named, prepared, noise)
+            rest = None if named is None else _reconstructed(block, named, prepared, noise)
             if rest is not None and rest.time.size:
                 law = sign * (followed.value - np.interp(followed.time, rest.time, rest.value))
             parts.append(followed)
@@ -114,7 +114,7 @@ def missing_input_of(
     return _with_dependence(block, recorded, parts, margin)
 
 
-def _followed(
+def _reconstructed(
     block: Block, core: _core.Rig, prepared: Prepared, noise: float
 ) -> Reconstruction | None:
     """The input in one recording; None where the model cannot follow it."""

@@ -113,7 +113,7 @@ def free_run(
             run, drawn = _run_of_recording(
                 prepared, problem, by_stage, nominal, model, noise_level or {}
             )
-            runs.append(_judged(run, prepared, problem.blocks, model, known))
+            runs.append(_with_off_channels(run, prepared, problem.blocks, model, known))
             missed = max((e.times_before for e in run.channels.values()), default=0.0)
             if missed > most:
                 most, curves = missed, drawn
@@ -185,7 +185,7 @@ def _run_of_recording(
     return entry, curves
 
 
-def _judged(
+def _with_off_channels(
     run: FreeRun,
     prepared: Prepared,
     blocks: Sequence[Block],
@@ -259,11 +259,11 @@ def _least_misses(
             least = {name: min(size, least.get(name, size)) for name, size in sizes.items()}
             if max(least.values()) <= _OFF_NOISES:
                 break
-            at = _moved(run, at, now)
+            at = _least_missing_step(run, at, now)
     return least
 
 
-def _moved(
+def _least_missing_step(
     run: Callable[[Array], dict[str, Array]],
     at: Array,
     now: dict[str, Array],
@@ -358,7 +358,7 @@ def _with_late_commands(recording: Recording, samples: float) -> Recording:
     return replace(recording, channels=recording.channels | moved)
 
 
-def said_of_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[str]:
+def notes_on_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[str]:
     """Channels that the whole rig misses by far more than their blocks do, in words: what is
     constant in a recording is fitted to each, and no block is judged by it.
 

@@ -226,7 +226,7 @@ def _carried(
 ) -> Array:
     """Change of a block's output by an error of a drive; zero where the model cannot follow."""
     value, slope = prepared.signals[name]
-    shaken = prepared.shaken({name: (value + more, slope + np.gradient(more, prepared.dt))})
+    shaken = prepared.with_signals({name: (value + more, slope + np.gradient(more, prepared.dt))})
     with contextlib.suppress(SimulationError):
         return change(block, core, shaken, base) - base.value
     return np.zeros_like(value)

@@ -360,7 +360,7 @@ def _with_more_noise(
         )
         more, steeper = smoothed(raw, prepared.dt, prepared.lengths[name])
         signals[name] = (value + more, slope + steeper)
-    return prepared.shaken(signals)
+    return prepared.with_signals(signals)
 
 
 def excess(

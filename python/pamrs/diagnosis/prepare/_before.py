@@ -44,7 +44,7 @@ class TimeBefore(NamedTuple):
         back = prepared.dt * np.minimum(np.arange(self.samples, 0, -1), self.moving)
         extended = {}
         for name, (value, slope) in signals.items():
-            first, rate = (float(array[0]) for array in prepared.begun(name, [0]))
+            first, rate = (float(array[0]) for array in prepared.with_starts(name, [0]))
             was = np.full(self.samples, first)
             if channel_of(name) in _PRESSURES:
                 was -= np.clip(rate * back, -_MOST_MOVED, _MOST_MOVED)

@@ -83,13 +83,21 @@ def begun_alike(
     beginnings = _Beginnings(blocks, core, prepared)
     counts = {block.channel: beginnings.remembered(block) for block in blocks}
     unsettled = {channel: count for channel, count in counts.items() if count > 0}
-    prepared = replace(prepared, unsettled=unsettled, unheard=_unheard(blocks, core, prepared))
+    prepared = replace(
+        prepared, unsettled=unsettled, after_holes=_rows_after_holes(blocks, core, prepared)
+    )
     moving = [block for block in blocks if block.mechanical and block.window is not None]
-    rests = [block.channel for block in moving if _rests(block, core, prepared, tolerances or {})]
-    return replace(prepared, at_rest=frozenset(rests), _begun={}) if rests else prepared
+    rests = [
+        block.channel
+        for block in moving
+        if _begins_at_rest(block, core, prepared, tolerances or {})
+    ]
+    return replace(prepared, at_rest=frozenset(rests), _start_states={}) if rests else prepared
 
 
-def _unheard(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> dict[str, Mask]:
+def _rows_after_holes(
+    blocks: Sequence[Block], core: _core.Rig, prepared: Prepared
+) -> dict[str, Mask]:
     """Rows of each channel that show when a command changed in a hole, which nobody recorded: what
     is not measured behind it (a regulator's outlet, a spool, the flow in a tube) went on there.
     """
@@ -107,7 +115,9 @@ def _unheard(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> di
     return rows_of
 
 
-def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances) -> bool:
+def _begins_at_rest(
+    block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances
+) -> bool:
     """True where the model follows a motion better from rest than from its first samples' speed.
 
     A joint on its stop that is given a speed, by the noise of a few samples, bounces, and what a
@@ -115,13 +125,13 @@ def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolera
     """
     missed = []
     for channels in (frozenset[str](), frozenset({block.channel})):
-        from_start = replace(prepared, at_rest=channels, _begun={})
-        missed.append(_left_at_first(block, core, from_start, tolerances))
+        from_start = replace(prepared, at_rest=channels, _start_states={})
+        missed.append(_first_window_misfit(block, core, from_start, tolerances))
     from_speed, from_rest = missed
     return from_speed - from_rest > _STILL_DEVIATIONS**2
 
 
-def _left_at_first(
+def _first_window_misfit(
     block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances
 ) -> float:
     """Chi-square that the first window of a block keeps, its parameters free inside their
@@ -162,22 +172,24 @@ class _Beginnings:
     def remembered(self, block: Block) -> int:
         """Samples up to the last one that shows how what nobody measured in a block began."""
         return max(
-            self._last(block, self._by_outlets(block)) if _set(block) and block.beside else 0,
-            self._last(block, self._by_tubes(block)) if block.tubes else 0,
+            self._last_sample(block, self._change_by_outlets(block))
+            if _regulator_commands(block) and block.beside
+            else 0,
+            self._last_sample(block, self._change_by_tubes(block)) if block.tubes else 0,
         )
 
-    def _last(self, block: Block, apart: Array) -> int:
+    def _last_sample(self, block: Block, apart: Array) -> int:
         """Samples up to the last one at which two predictions can be told apart."""
         most = _OUTLET_NOISES * self.prepared.noise[block.channel]
         shown = np.flatnonzero(np.abs(apart) > most)
         return int(shown[-1]) + 1 if shown.size else 0
 
-    def _by_outlets(self, block: Block) -> Array:
+    def _change_by_outlets(self, block: Block) -> Array:
         """Change of a prediction if regulators begin at their set pressures."""
         prepared = self.prepared
         outlets = {
             qualified("supply", block_of(name)): max(0.0, float(prepared.held[name][0]))
-            for name in _set(block)
+            for name in _regulator_commands(block)
         }
         try:
             return predicted(block, self.core, prepared, outlets) - self._predicted_from(
@@ -186,7 +198,7 @@ class _Beginnings:
         except SimulationError:
             return np.zeros(0)  # the fit says what cannot be predicted
 
-    def _by_tubes(self, block: Block) -> Array:
+    def _change_by_tubes(self, block: Block) -> Array:
         """Change of a prediction if air flowed through tubes before; empty where it did not."""
         try:
             apart = self._predicted_from(block, moving=True) - self._predicted_from(
@@ -194,7 +206,8 @@ class _Beginnings:
             )
             little = np.abs(apart).max() <= _STILL_NOISES * self.prepared.noise[block.channel]
             at_rest = all(
-                (little and self._stands_still(tube)) or self._waits(tube) for tube in block.tubes
+                (little and self._stands_still(tube)) or self._is_opened_at_rest(tube)
+                for tube in block.tubes
             )
         except SimulationError:
             return np.zeros(0)
@@ -215,14 +228,16 @@ class _Beginnings:
                 return False
         return bool(names)
 
-    def _waits(self, tube: Tube) -> bool:
+    def _is_opened_at_rest(self, tube: Tube) -> bool:
         """True where a tube at rest is opened as the recording begins: until its ends hear of each
         other, `to` stands still, and neither moves as it would in a flow.
         """
         early = int(_SILENT_DELAYS * tube.delay / self.prepared.dt)
         ends = [name for name in (tube.end, tube.beginning) if name in self.at]
         evidences = [
-            evidence for name in ends if (evidence := self._tells(name, early)) is not None
+            evidence
+            for name in ends
+            if (evidence := self._evidence_of_rest(name, early)) is not None
         ]
         if tube.end not in ends or len(evidences) < len(ends):
             return False
@@ -231,7 +246,7 @@ class _Beginnings:
         least = math.log(_REST_LIKELIHOOD)
         return fits and min(likely) > least
 
-    def _tells(self, channel: str, early: int) -> tuple[bool, float] | None:
+    def _evidence_of_rest(self, channel: str, early: int) -> tuple[bool, float] | None:
         """True for first samples of a channel that fit a rest, and the log likelihood of rest
         against flow; None where there are too few samples.
         """
@@ -262,7 +277,7 @@ class _Beginnings:
         return self._predictions[key]
 
 
-def _set(block: Block) -> list[str]:
+def _regulator_commands(block: Block) -> list[str]:
     """Commands of the regulators that a block is driven by."""
     return [name for name in block.drives if channel_of(name) == "supply_command"]
 
@@ -270,8 +285,8 @@ def _set(block: Block) -> list[str]:
 def _unmeasured(block: Block) -> str:
     """Words on what nobody measured in a block, and on what would measure it."""
     reasons = []
-    if _set(block) and block.beside:
-        gauges = [dotted("supply_pressure", block_of(name)) for name in _set(block)]
+    if _regulator_commands(block) and block.beside:
+        gauges = [dotted("supply_pressure", block_of(name)) for name in _regulator_commands(block)]
         reasons.append(
             "they show where the regulator began, and nobody measured that (a gauge for "
             f"{' or '.join(gauges)} would)"
@@ -285,7 +300,7 @@ def _unmeasured(block: Block) -> str:
     return ", or ".join(reasons)
 
 
-def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
+def notes_on_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
     """Sentences on beginnings that are not judged.
 
     Parameters
@@ -311,7 +326,9 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
             notes.append(
                 f"block {block.name}: the first {times} were not judged: {_unmeasured(block)}"
             )
-        heard = [(p, p.unheard[block.channel].sum()) for p in each if block.channel in p.unheard]
+        heard = [
+            (p, p.after_holes[block.channel].sum()) for p in each if block.channel in p.after_holes
+        ]
         if heard:
             times = ", ".join(f"{count * p.dt:.3g} s of {p.recording.name}" for p, count in heard)
             notes.append(
@@ -321,7 +338,7 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
     return notes
 
 
-def said_of_warm_starts(
+def notes_on_warm_starts(
     blocks: Sequence[Block],
     recordings: Sequence[Prepared],
     residuals: Mapping[tuple[str, str], Residual],

@@ -793,7 +793,9 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
     return base.freed(measured - prediction)
 
 
-def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tuple[Array, Array]]:
+def signals_at_starts(
+    block: Block, prepared: Prepared, starts: list[int]
+) -> dict[str, tuple[Array, Array]]:
     """Smoothed channels, with the best estimates, where windows start, of what a block integrates
     (an arm: all joints); inlets of lines only where the block is cut there.
     """
@@ -810,7 +812,7 @@ def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tupl
         if n == block.thermometer
         or (channel_of(n) in DRIVES and (channel_of(n) != "line_pressure" or n in around))
     }
-    at_starts = {name: prepared.begun(name, starts) for name in state if name in drives}
+    at_starts = {name: prepared.with_starts(name, starts) for name in state if name in drives}
     return drives | at_starts | _warm(block, prepared)
 
 
@@ -822,7 +824,7 @@ def _warm(block: Block, prepared: Prepared) -> dict[str, tuple[Array, Array]]:
     return {block.warm.channel: (np.full(prepared.n, begins), np.zeros(prepared.n))}
 
 
-def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
+def _core_of_recording(core: _core.Rig, prepared: Prepared) -> _core.Rig:
     """A compiled rig with the values that it had in a recording."""
     values = prepared.recording.parameters
     if not values:
@@ -862,10 +864,10 @@ def predicted(
     (n,) array
         In the channel's unit.
     """
-    core = _there(core, prepared)
+    core = _core_of_recording(core, prepared)
     starts = prepared.starts(block.window, block.drives)
     commands = prepared.driving(mechanical=block.mechanical)
-    signals, lead = begun(block, prepared, starts), 0
+    signals, lead = signals_at_starts(block, prepared, starts), 0
     if before is not None:
         lead = before.samples
         commands = before.commands(commands, prepared.n)
@@ -896,7 +898,7 @@ def _anchors(block: Block, prepared: Prepared, starts: list[int], lead: int = 0)
     return sorted(set(each) - set(starts))
 
 
-def _shown(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
+def _start_columns(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
     """Columns of what the start of a window can do, (n, k): of a pressure without the temperature
     at which its gas began once that is forgotten; of a temperature without where a thermometer
     stood that is not late.
@@ -1010,7 +1012,9 @@ def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array
         # how far it falls goes with the valve's area over the tank's volume, which nobody knows
         for off, steeper in ((np.ones_like(value), 0.0), (value - value[0], 1.0)):
             step = 1e-3 * max(1.0, float(np.abs(value).max())) / max(1.0, float(np.abs(off).max()))
-            moved = prepared.shaken({name: (value + step * off, slope * (1.0 + step * steeper))})
+            moved = prepared.with_signals(
+                {name: (value + step * off, slope * (1.0 + step * steeper))}
+            )
             bare = replace(moved, recording=replace(moved.recording, parameters={}))
             columns.append((predicted(block, core, bare) - prediction) / step)
     return columns
@@ -1052,7 +1056,7 @@ def _with_slopes(
         default_step(prepared.dt, longest=block.step),
         starts,
         names,
-        begun(block, prepared, starts),
+        signals_at_starts(block, prepared, starts),
         prepared.n,
         anchors=_anchors(block, prepared, starts),
         **({} if given is None else given._asdict()),
@@ -1087,7 +1091,7 @@ def _from_its_start(
     for _ in range(_START_STEPS):
         prediction, jacobian, _ = with_slopes
         start = np.where(rows[:, None], jacobian[first, len(names) :], 0.0)
-        columns = _shown(block, start, starts[0], prepared)
+        columns = _start_columns(block, start, starts[0], prepared)
         value = np.where(rows, measured - prediction[first], 0.0)
         if columns.shape[1] < 2 or not np.isfinite(value).all():
             break  # nothing of it is seen
@@ -1122,7 +1126,7 @@ def residual(
     given : Input, optional
         An input of the block beside what its model makes; the residual then has a `response`.
     """
-    core = _there(core, prepared)
+    core = _core_of_recording(core, prepared)
     starts = prepared.starts(block.window, block.drives)
     # without parameters a free null direction is still wanted for the window's start: ask for one
     # parameter
@@ -1185,7 +1189,7 @@ def _freed_of_starts(
     temperature, strain = (begins if gas else None), 0.0
     bases: list[tuple[int, int, Array]] = []
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
-        start = _shown(block, columns[a:b], a, prepared)
+        start = _start_columns(block, columns[a:b], a, prepared)
         if np.count_nonzero(rows[a:b]) < WINDOW_SAMPLES_PER_STATE * start.shape[1]:
             rows[a:b], value[a:b], slopes[a:b] = False, 0.0, 0.0
             continue

@@ -169,7 +169,7 @@ def shared_rows(
         for mean in (False, True) if abs(rate) * ratio > 1.5 else (False,):
             for phase in range(phases):
                 at = Alignment(rate, start + phase * fast.sample_time, mean)
-                for alignment in _at(slow, fast, (slow_channels, fast_channels), at):
+                for alignment in _alignments_at(slow, fast, (slow_channels, fast_channels), at):
                     some = True
                     yield alignment
     if not some:
@@ -197,7 +197,7 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     for _ in range(4):  # steps of the signal do not say how noise is told
         if use.sum() < 2 * offsets.size:
             break
-        weights, follows = _followed(centred, offsets, centred, use)
+        weights, follows = _prediction_by(centred, offsets, centred, use)
         deviations = centred - follows
         size = 1.25 * float(np.mean(np.abs(deviations[use])))
         use = counted & (np.abs(deviations) <= _STEP_NOISES * size)
@@ -212,7 +212,7 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     return _Deviations(filled, known, np.where(inner & ~steps, deviations / size, 0.0), coarse)
 
 
-def _followed(source: Array, offsets: Index, wanted: Array, use: Mask) -> tuple[Array, Array]:
+def _prediction_by(source: Array, offsets: Index, wanted: Array, use: Mask) -> tuple[Array, Array]:
     """Weights with which a source's samples at some offsets predict the wanted ones best in some
     rows, and that prediction of all samples.
     """
@@ -238,16 +238,18 @@ def _step(values: Array) -> float:
     return step if np.mean(np.abs(off - np.round(off)) < 0.02) > 0.99 else 0.0
 
 
-def _moved(fast: Recording, name: str, one: _Deviations, at: Array, width: float) -> _Deviations:
+def _channel_at(
+    fast: Recording, name: str, one: _Deviations, at: Array, width: float
+) -> _Deviations:
     """A channel at times [s], which may be its own, from either end."""
     for way in (1, -1):
         apart = at - fast.time[::way] if at.size == len(fast) else np.inf
         if np.max(np.abs(apart)) < 1e-6 * fast.sample_time:  # but for rounding
             return one.at(np.arange(len(fast))[::way])
-    return _seen(fast, name, at, width)._replace(step=one.step)
+    return _interpolated(fast, name, at, width)._replace(step=one.step)
 
 
-def _seen(fast: Recording, name: str, at: Array, width: float) -> _Deviations:
+def _interpolated(fast: Recording, name: str, at: Array, width: float) -> _Deviations:
     """A channel at times [s]; means over a width [s] above its sample time. What lies between two
     samples or is a mean is on no step of a converter, and has its pattern all the same.
     """
@@ -325,7 +327,7 @@ def _rate(
     return rate_found
 
 
-def _at(
+def _alignments_at(
     slow: Recording,
     fast: Recording,
     channels: tuple[dict[str, _Deviations], dict[str, _Deviations]],
@@ -337,7 +339,7 @@ def _at(
     count = int(fast.duration / abs(step) + 1.5)
     at: Array = alignment.lag + step * np.arange(count, dtype=np.float64)
     width = abs(step) if alignment.mean else 0.0
-    other = {name: _moved(fast, name, one, at, width) for name, one in fast_channels.items()}
+    other = {name: _channel_at(fast, name, one, at, width) for name, one in fast_channels.items()}
     between = abs(step) / fast.sample_time
     whole = abs(between - round(between)) < 1e-6  # what lies between samples is on no step
     lags = {name: _lags(channel, other[name]) for name, channel in slow_channels.items()}
@@ -409,7 +411,7 @@ def _by_window(a: _Deviations, b: _Deviations) -> tuple[Mask, Mask, bool]:
         nothing = np.zeros(wanted.size, dtype=bool)
         return nothing, nothing, False
     use = wanted != 0.0
-    _, follows = _followed(b.deviations, offsets, wanted, use)
+    _, follows = _prediction_by(b.deviations, offsets, wanted, use)
     product, own_power, other, alive = (
         uniform_filter1d(part, WINDOW_SAMPLES, mode="nearest")
         for part in (

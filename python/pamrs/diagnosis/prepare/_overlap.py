@@ -77,12 +77,12 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
     notes, channels = list[str](), ChannelDeviations()
     for place in sorted(places, key=lambda k: recordings[k].role != "fit"):
         before = [one for parts in kept_parts.values() for one in parts]
-        kept_parts[place], notes_of_one = _new_in(recordings[place], before, channels)
+        kept_parts[place], notes_of_one = _unshared_parts(recordings[place], before, channels)
         notes += notes_of_one
     return [one for place in places for one in kept_parts[place]], notes
 
 
-def _new_in(
+def _unshared_parts(
     recording: Recording, before: Sequence[Recording], channels: ChannelDeviations
 ) -> tuple[list[Recording], list[str]]:
     """Parts of a recording that are not in others, and a sentence where these are not all of it."""
@@ -92,13 +92,13 @@ def _new_in(
         if shared is None or not (across or shared.share > _COPY_SHARE):
             continue
         same = (
-            f"{_called(recording)} holds the same samples as {_called(other)}, noise included "
+            f"{_name_of(recording)} holds the same samples as {_name_of(other)}, noise included "
             f"({shared.own[0]:.4g} to {shared.own[1]:.4g} s are its {shared.other[0]:.4g} to "
             f"{shared.other[1]:.4g} s): "
         )
         if not across:
             return [], [same + "it says nothing more and was left out"]
-        new = _left_of(recording, shared.free, before, channels)
+        new = _unshared_stretches(recording, shared.free, before, channels)
         if not new:
             spent = max((stop - start for start, stop in shared.free), default=0.0)
             short = f"; the longest stretch that it does not share, {spent:.3g} s, is too short"
@@ -112,7 +112,7 @@ def _new_in(
                 for one, part in zip(cut, new, strict=True)
             ]
         note = [same + f"of it {parts} are held out, the rest is no proof"]
-        once = [_new_in(one, before, channels) for one in cut]
+        once = [_unshared_parts(one, before, channels) for one in cut]
         return [one for parts, _ in once for one in parts], [
             *note,
             *(s for _, texts in once for s in texts),
@@ -120,7 +120,7 @@ def _new_in(
     return [recording], []
 
 
-def _left_of(
+def _unshared_stretches(
     recording: Recording,
     free: Sequence[tuple[float, float]],
     before: Sequence[Recording],
@@ -142,11 +142,11 @@ def _left_of(
             (0.0, part.duration),
         ):  # shorter than before: this comes to an end
             inner = [(start + a, start + b) for a, b in shared_again.free if b - a < stop - start]
-            stretches_left += _left_of(recording, inner, before, channels)
+            stretches_left += _unshared_stretches(recording, inner, before, channels)
     return stretches_left
 
 
-def _called(recording: Recording) -> str:
+def _name_of(recording: Recording) -> str:
     return recording.name + (f" ({recording.source})" if recording.source else "")
 
 
@@ -179,7 +179,9 @@ def overlap(
     clearest = max(each, key=lambda one: int(one.same.sum()), default=None)
     if clearest is None:
         return None
-    runs = [(float(slow.time[a]), float(slow.time[b - 1])) for a, b in stretches(_taken(clearest))]
+    runs = [
+        (float(slow.time[a]), float(slow.time[b - 1])) for a, b in stretches(_shared_mask(clearest))
+    ]
     rows = np.flatnonzero(clearest.same)
     at = (float(slow.time[rows[0]]), float(slow.time[rows[-1]]))
     in_fast = _in_other(clearest.alignment, at)
@@ -206,7 +208,7 @@ def _in_other(way: Alignment, run: tuple[float, float]) -> tuple[float, float]:
     return min(first, last), max(first, last)
 
 
-def _taken(alignment: SharedRows) -> Mask:
+def _shared_mask(alignment: SharedRows) -> Mask:
     """Rows that two recordings share: those found to be the same, and all between them but for runs
     of three windows or more that differ.
     """

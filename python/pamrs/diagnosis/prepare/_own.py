@@ -35,7 +35,7 @@ def varying(rig: Rig, core: _core.Rig) -> set[str]:
     return {*core.parameter_names, *begin}
 
 
-def own_of_rig(rig: Rig, recordings: Sequence[Recording]) -> list[Recording]:
+def with_declared_values(rig: Rig, recordings: Sequence[Recording]) -> list[Recording]:
     """Recordings with the values that the rig file leaves to each of them, where they do not say
     them, all under the names that the core has.
 
@@ -168,7 +168,7 @@ def with_own_values(
     return at(values)
 
 
-def said_of_own(recordings: Sequence[Prepared]) -> list[str]:
+def notes_on_own_values(recordings: Sequence[Prepared]) -> list[str]:
     """Values that recordings have of their own, in words, and how far they are from each other."""
     values_of: dict[str, dict[str, float]] = {}
     notes = []

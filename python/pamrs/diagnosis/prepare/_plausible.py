@@ -150,7 +150,7 @@ def implausible(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> 
         *_valves(recording, rig),
         *(
             f"{told}: a command that was not logged; map the right column, or leave this one out"
-            for told in _dead(recording, rig).values()
+            for told in _dead_commands(recording, rig).values()
         ),
     ]
 
@@ -189,21 +189,21 @@ def without_impossible(
             bad = mask[name] & ((channels[name] < low) | (channels[name] > high))
             table = rig.tables("valve").get(block_of(name))
             if channel_of(name) == "valve_command" and table is not None:
-                bad, low, high = _lost(channels[name], mask[name], table, settings)
+                bad, low, high = _lost_commands(channels[name], mask[name], table, settings)
             if bad.any():
                 mask[name] = mask[name] & ~bad
                 channels[name] = np.where(bad, np.nan, channels[name])
                 where = recording.source or recording.name
                 notes.append(
                     f"{recording.name}: {int(bad.sum())} samples of {name} in {where} are beyond "
-                    f"the possible ({_told(recording, name, low, high)}) and were masked: "
+                    f"the possible ({_text(recording, name, low, high)}) and were masked: "
                     f"{_when(bad, recording)}"
                 )
         masked.append(replace(recording, mask=mask, channels=channels))
     return masked, notes
 
 
-def _lost(
+def _lost_commands(
     values: Array, mask: Mask, table: Mapping[str, Any], settings: DiagnosisSettings
 ) -> tuple[Mask, float, float]:
     """Samples that a logger lost of a valve's command, and the range [V] beyond which they are.
@@ -244,7 +244,7 @@ def _when(bad: Mask, recording: Recording) -> str:
     return ", ".join(spans) + more
 
 
-def _told(recording: Recording, name: str, *values: float, digits: str = ".3g") -> str:
+def _text(recording: Recording, name: str, *values: float, digits: str = ".3g") -> str:
     """Values of a channel in the unit that its log has."""
     return in_words(recording.said.get(name, ""), unit_of(name), *values, digits=digits)
 
@@ -272,7 +272,7 @@ def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> I
     rated = {
         dotted("supply_pressure", supply): set_to
         for supply in rig.tables("supply")
-        if (set_to := _set_to(recording, rig, supply)) is not None
+        if (set_to := _set_pressure(recording, rig, supply)) is not None
     }
     largest = max(
         [
@@ -292,14 +292,14 @@ def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> I
         high = float(np.quantile(np.abs(values), 0.995))
         if 0.0 < high < _LEAST_PEAK_PRESSURE and np.ptp(values) > 0.0:
             yield (
-                f"{name} never exceeds {_told(recording, name, high)} gauge; a pressure of air "
-                f"exceeds {_told(recording, name, _LEAST_PEAK_PRESSURE)} somewhere: are its values "
+                f"{name} never exceeds {_text(recording, name, high)} gauge; a pressure of air "
+                f"exceeds {_text(recording, name, _LEAST_PEAK_PRESSURE)} somewhere: are its values "
                 "in bar (or is it another column, an angle or a voltage) under a heading in Pa?"
             )
         elif high > top:
             yield (
-                f"{name} reaches {_told(recording, name, high)} gauge; at most "
-                f"{_told(recording, name, top)} is allowed: are its values in Pa, kPa or psi under "
+                f"{name} reaches {_text(recording, name, high)} gauge; at most "
+                f"{_text(recording, name, top)} is allowed: are its values in Pa, kPa or psi under "
                 "a heading in bar?"
             )
         elif name in rated:
@@ -308,9 +308,9 @@ def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> I
             low_end = _SUPPLY_LEAST_SHARE * min(size, _in_front(recording, rig, block_of(name)))
             if size > 0.0 and not low_end <= high <= _SUPPLY_MOST_SHARE * size:
                 yield (
-                    f"{name} is at most {_told(recording, name, high)} and {source} "
-                    f"{_told(recording, name, size)}; "
-                    f"{_told(recording, name, low_end, _SUPPLY_MOST_SHARE * size)} is allowed: "
+                    f"{name} is at most {_text(recording, name, high)} and {source} "
+                    f"{_text(recording, name, size)}; "
+                    f"{_text(recording, name, low_end, _SUPPLY_MOST_SHARE * size)} is allowed: "
                     "right column and unit?"
                 )
 
@@ -332,7 +332,7 @@ def _in_front(recording: Recording, rig: Rig, supply: str) -> float:
     return max(0.0, float(known.min())) if known.size else stated
 
 
-def _set_to(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | None:
+def _set_pressure(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | None:
     """Highest pressure [Pa gauge] that a supply should have, and the command that says so; no
     command where the rig file does.
 
@@ -366,7 +366,7 @@ def _frozen_tanks(recording: Recording, rig: Rig) -> Iterator[str]:
         ]
         if any(float(np.ptp(v)) > _FROZEN_TANK_CHANGE for v in moved):
             yield (
-                f"{name} has the one value {_told(recording, name, values[0], digits='.6g')} "
+                f"{name} has the one value {_text(recording, name, values[0], digits='.6g')} "
                 "throughout although its tank is drawn from: a frozen transducer; leave "
                 'the column out, or say [supply] kind = "constant" if it is one'
             )
@@ -412,7 +412,7 @@ def _order(recording: Recording, rig: Rig) -> Iterator[str]:
             share = float(np.mean(above))
             if share > _ORDER_TIME_SHARE:
                 median, other = (
-                    _told(recording, name, float(np.median(median)))
+                    _text(recording, name, float(np.median(median)))
                     for median in (recording.channels[name][rows], limit)
                 )
                 yield (
@@ -431,7 +431,7 @@ def _highest(recording: Recording, rig: Rig, supply: str) -> tuple[str, Mask, Ar
     full = dotted("supply_pressure", supply)
     if full in recording.channels:
         return full, recording.mask[full], recording.channels[full]
-    set_to = _set_to(recording, rig, supply)
+    set_to = _set_pressure(recording, rig, supply)
     if set_to is None:
         return None
     size, command = set_to
@@ -498,8 +498,8 @@ def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iter
             )
             yield (
                 f"{name} is outside {whose} for {100 * share:.0f} % of the time: from "
-                f"{_told(recording, name, values.min(), values.max())}, where "
-                f"{_told(recording, name, moving.low, moving.high)} are possible: right column, "
+                f"{_text(recording, name, values.min(), values.max())}, where "
+                f"{_text(recording, name, moving.low, moving.high)} are possible: right column, "
                 f"unit ({units}) and sign?"
             )
         rows = recording.mask[name]
@@ -510,8 +510,8 @@ def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iter
         if fast > moving.fastest:
             yield (
                 f"{name} {'turns' if unit == 'rad' else 'moves'} with "
-                f"{_told(recording, name, fast)}/s, one sample in a hundred faster; at most "
-                f"{_told(recording, name, moving.fastest)}/s is allowed: are the units of 'time' "
+                f"{_text(recording, name, fast)}/s, one sample in a hundred faster; at most "
+                f"{_text(recording, name, moving.fastest)}/s is allowed: are the units of 'time' "
                 f"(s, ms, us) and of the {'angle' if unit == 'rad' else 'length'} those that their "
                 "values are in?"
             )
@@ -532,7 +532,7 @@ def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iter
                 else "a frozen transducer and a load that is held"
             )
             yield (
-                f"{name} has the one value {_told(recording, name, values[0], digits='.4g')} "
+                f"{name} has the one value {_text(recording, name, values[0], digits='.4g')} "
                 f"throughout while its muscles' pressures change: {what} cannot be told apart, "
                 "and neither is in the model; leave the recording out"
             )
@@ -559,9 +559,9 @@ def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
             middle = float(np.median(recording.channels[name][both]))
             yield (
                 f"{name} is beyond twice its valve's range for {100 * beyond:.0f} % of the time "
-                f"(median {_told(recording, name, middle)}); "
-                f"{_told(recording, name, table['null_voltage'])} +- "
-                f"{_told(recording, name, table['half_range'])} is the range: right column and "
+                f"(median {_text(recording, name, middle)}); "
+                f"{_text(recording, name, table['null_voltage'])} +- "
+                f"{_text(recording, name, table['half_range'])} is the range: right column and "
                 "unit?"
             )
             continue
@@ -617,7 +617,7 @@ def _commanded(rig: Rig) -> Iterator[tuple[str, str]]:
             yield from ((command, filled(end)) for end in direct)
 
 
-def _dead(recording: Recording, rig: Rig) -> dict[str, str]:
+def _dead_commands(recording: Recording, rig: Rig) -> dict[str, str]:
     """Commands of one value while their pressure rests and then is filled or vented, with the
     evidence: at one opening, or one set pressure, it comes to rest once, and motion changes it by
     less.
@@ -642,7 +642,7 @@ def _dead(recording: Recording, rig: Rig) -> dict[str, str]:
         if largest > _DEAD_COMMAND_RATIO:
             evidence[command] = (
                 f"{command} has one value throughout "
-                f"({_told(recording, command, values[0], digits='g')}) while {pressure} stands "
+                f"({_text(recording, command, values[0], digits='g')}) while {pressure} stands "
                 f"still and then changes {largest:.3g}-fold (absolute) within "
                 f"{_DEAD_COMMAND_TIME:g} s; at most {_DEAD_COMMAND_RATIO:g}-fold can be of one "
                 "command"
@@ -676,7 +676,7 @@ def without_dead_commands(
         return list(recordings), []
     recordings_left, faults = list(recordings), list[Faulty]()
     for command in dict.fromkeys(command for command, _ in _commanded(rig)):
-        evidence = {r.name: _dead(r, rig).get(command) for r in recordings_left}
+        evidence = {r.name: _dead_commands(r, rig).get(command) for r in recordings_left}
         dead = {name: text for name, text in evidence.items() if text}
         # what has that one value elsewhere was not logged there either
         live = [r for r in recordings_left if r.name not in dead and _moves(r, command)]
@@ -762,7 +762,7 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         return None
     signals, name = prepared.signals, block.channel
     value, slope = signals[name]
-    span = _told(prepared.recording, name, measured.min(), measured.max())
+    span = _text(prepared.recording, name, measured.min(), measured.max())
     shown = f"{name} goes from {span}, not as the model says"
     turned = float(np.median(measured + model))
     others: list[tuple[float, float, dict[str, tuple[Array, Array]], str]] = [
@@ -796,7 +796,7 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         raw = prepared.raw | {name: offset + factor * prepared.raw[name]}
         noise = prepared.noise | {name: abs(factor) * prepared.noise[name]}
         shown_as = {**signals, **swapped, name: (offset + factor * value, factor * slope)}
-        other = replace(prepared.shaken(shown_as), raw=raw, noise=noise, _begun={})
+        other = replace(prepared.with_signals(shown_as), raw=raw, noise=noise, _start_states={})
         try:
             model = predicted(block, core, other)[rows]
         except SimulationError:

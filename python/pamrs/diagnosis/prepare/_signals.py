@@ -117,11 +117,11 @@ class Prepared:
     settings: DiagnosisSettings
     steps: dict[str, float] = field(default_factory=dict)
     unsettled: dict[str, int] = field(default_factory=dict)
-    unheard: dict[str, Mask] = field(default_factory=dict)
+    after_holes: dict[str, Mask] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
     simulated: tuple[str, ...] = ()
     at_rest: frozenset[str] = frozenset()
-    _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
+    _start_states: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
         repr=False, default_factory=dict
     )
     _clear: dict[tuple[str, ...], Mask] = field(repr=False, default_factory=dict)
@@ -171,7 +171,7 @@ class Prepared:
         starts |= set((np.flatnonzero(good[1:] & ~good[:-1]) + 1).tolist())
         return sorted(starts)
 
-    def begun(self, channel: str, starts: list[int]) -> tuple[Array, Array]:
+    def with_starts(self, channel: str, starts: list[int]) -> tuple[Array, Array]:
         """Smoothed channel and its derivative, with the best estimates of both where windows start.
 
         At the edge of a recording the filter's derivative is ten times as noisy as inside, and a
@@ -180,7 +180,7 @@ class Prepared:
         one cubic all of it.
         """
         key = (channel, tuple(starts))
-        if key not in self._begun:
+        if key not in self._start_states:
             value, slope = (array.copy() for array in self.signals[channel])
             for at in starts if self.lengths[channel].any() else []:
                 state = _state(
@@ -195,13 +195,15 @@ class Prepared:
                     state = float(np.median(self.raw[channel][rows])), 0.0
                 if state is not None:
                     value[at], slope[at] = state
-            self._begun[key] = value, slope
-        return self._begun[key]
+            self._start_states[key] = value, slope
+        return self._start_states[key]
 
     def bridged(self) -> Prepared:
         """Recording without holes, for simulations through them: no window begins there."""
         whole = {name: np.ones_like(own) for name, own in self.recording.mask.items()}
-        return replace(self, recording=replace(self.recording, mask=whole), _begun={}, _clear={})
+        return replace(
+            self, recording=replace(self.recording, mask=whole), _start_states={}, _clear={}
+        )
 
     def commanded_early(self) -> Prepared | None:
         """Recording whose commands change where a hole in them begins, not where it ends; None
@@ -220,10 +222,12 @@ class Prepared:
             return None
         return replace(self, commands=commands, held=logged)
 
-    def shaken(self, shaken: dict[str, tuple[Array, Array]]) -> Prepared:
+    def with_signals(self, shaken: dict[str, tuple[Array, Array]]) -> Prepared:
         """Recording with other smoothed channels; the starts of all others are kept."""
-        kept = {key: state for key, state in dict(self._begun).items() if key[0] not in shaken}
-        return replace(self, signals=self.signals | shaken, _begun=kept)
+        kept = {
+            key: state for key, state in dict(self._start_states).items() if key[0] not in shaken
+        }
+        return replace(self, signals=self.signals | shaken, _start_states=kept)
 
     def usable(self, output: str, drives: tuple[str, ...], starts: list[int]) -> Mask:
         """Rows whose prediction rests on measured drives since their window began, and whose output
@@ -235,8 +239,8 @@ class Prepared:
             first = np.flatnonzero(bad[a:b])
             rows[a : a + (int(first[0]) if first.size else b - a)] = True
         rows[: self.unsettled.get(output, 0)] = False
-        if output in self.unheard:
-            rows &= ~self.unheard[output]
+        if output in self.after_holes:
+            rows &= ~self.after_holes[output]
         return rows & self.recording.mask[output]
 
 

@@ -21,7 +21,7 @@ _LEAST_SLACK_SHARE = 0.01  # of the samples of a recording in which it has to
 _BETTER = 0.5  # share of what is missed there that is left with a push, where the lag is of that
 
 
-def said_of_slack(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
+def notes_on_slack(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
     """Sentences on models that lag where muscles are slack, and would follow if these pushed.
 
     Parameters

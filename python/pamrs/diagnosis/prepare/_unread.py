@@ -21,7 +21,7 @@ def begins_at(gauge: str) -> str:
     return f"{qualified('supply', gauge.partition('.')[2])}.initial_pressure"
 
 
-def unread_tanks(rig: Rig, channels: Sequence[str]) -> list[str]:
+def tanks_without_gauge(rig: Rig, channels: Sequence[str]) -> list[str]:
     """Channels of tanks that nobody measured and whose pressure can be simulated, since what they
     feed and what is commanded there is recorded.
 
@@ -39,11 +39,11 @@ def unread_tanks(rig: Rig, channels: Sequence[str]) -> list[str]:
     return [gauge for gauge in missing if gauge in with_gauges]
 
 
-def blocks_beside_tanks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
+def blocks_with_tanks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
     """The blocks that these channels can tell apart (:func:`available_blocks`), those driven by the
     simulated pressure of a tank included, the tank itself not.
     """
-    tanks = unread_tanks(rig, channels)
+    tanks = tanks_without_gauge(rig, channels)
     no_gauge = {f"{qualified('supply', t.partition('.')[2])}.pressure_zero" for t in tanks}
     return [
         replace(
@@ -69,7 +69,7 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
     prepared : Prepared
         The recording.
     tanks : sequence of str
-        From :func:`unread_tanks`.
+        From :func:`tanks_without_gauge`.
     """
     names = tuple(prepared.recording.channels)
     for tank in tanks:
@@ -79,7 +79,7 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
         first = rig.parameter(begins_at(tank)).value if own_pressure is None else own_pressure.value
         level = np.full(prepared.n, first)
         flat = replace(
-            prepared.shaken({tank: (level, np.zeros(prepared.n))}),
+            prepared.with_signals({tank: (level, np.zeros(prepared.n))}),
             raw=prepared.raw | {tank: level},
             noise=prepared.noise | {tank: 0.0},
             lengths=prepared.lengths | {tank: np.zeros(prepared.n, dtype=np.intp)},
@@ -92,11 +92,11 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
         except SimulationError:  # it then stands still
             value = level
         slope = np.gradient(value, prepared.dt)
-        prepared = flat.shaken({tank: (value, slope)})
+        prepared = flat.with_signals({tank: (value, slope)})
     return prepared
 
 
-def said_of_tanks(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
+def notes_on_tanks(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
     """Sentences on tanks without a gauge: the blocks that their simulated pressure drives."""
     notes = []
     for tank in dict.fromkeys(name for block in blocks for name in block.floating):

@@ -141,7 +141,9 @@ def find_closure(
     chosen = _select(
         _StackedFit.of(problem, baseline, baseline, inflation), candidates, columns, {}
     )
-    first = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
+    first = (
+        None if chosen is None else _fit_terms(problem, nominal, baseline, inflation, chosen, say)
+    )
     if first is None:
         return None
     autocorrelation = autocorrelation_of(problem, first, noise_level or {})
@@ -152,9 +154,9 @@ def find_closure(
         _StackedFit.of(problem, warm, first, autocorrelation), candidates, columns, first.values
     )
     other = (
-        None if second is None else _fitted(problem, nominal, warm, autocorrelation, second, say)
+        None if second is None else _fit_terms(problem, nominal, warm, autocorrelation, second, say)
     )
-    return _better(
+    return _best_model(
         [baseline, first, *([] if other is None else [other])],
         problem,
         autocorrelation,
@@ -343,7 +345,7 @@ def _price(samples: float, among: int) -> float:
     return math.log(samples) + 2.0 * math.log(among)
 
 
-def _better(
+def _best_model(
     models: list[Fit], problem: Problem, inflation: dict[str, float], among: int
 ) -> Fit | None:
     """Best model by misfit and price, on the independent samples of the least misfit; None for the
@@ -581,7 +583,7 @@ class _CrossValidation:
         return misfit
 
 
-def _fitted(
+def _fit_terms(
     problem: Problem,
     nominal: Rig,
     warm: Fit,

@@ -141,7 +141,7 @@ class Reading:
             raw=turned(prepared.raw),
             noise=noise,
             steps={name: maps.get(name, 1.0) * step for name, step in prepared.steps.items()},
-            _begun={},
+            _start_states={},
         )
 
     def read(self, problem: Problem) -> Problem:
