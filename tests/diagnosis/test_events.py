@@ -11,7 +11,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis.fit import Events, residuals
-from pamrs.diagnosis.fit._shaken import lines_of
+from pamrs.diagnosis.fit._vibration import lines_of
 from pamrs.diagnosis.prepare import Residual
 from pamrs.effects import Term
 from pamrs.recordings import Recording

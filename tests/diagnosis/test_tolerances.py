@@ -16,7 +16,12 @@ import pamrs
 from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.fit._fitting import Scaling
-from pamrs.diagnosis.fit._held import in_tolerances, largest_value, moved_slope, moved_value
+from pamrs.diagnosis.fit._known_parameters import (
+    in_tolerances,
+    largest_value,
+    moved_slope,
+    moved_value,
+)
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import Prepared, begun_alike, predicted, residual
 from pamrs.rig import Parameter

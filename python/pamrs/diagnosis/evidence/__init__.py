@@ -22,13 +22,13 @@ from pamrs.diagnosis.evidence._candidates import (
     start_of,
     without_autocorrelation,
 )
-from pamrs.diagnosis.evidence._determined import (
+from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
+from pamrs.diagnosis.evidence._undetermined import (
     drop_undetermined,
     is_outside,
     put_aside,
     with_stated_std,
 )
-from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
 from pamrs.diagnosis.evidence._verdicts import (
     SHARED_ODDS,
     WALL_TOLERANCES,

@@ -17,8 +17,8 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array
 from pamrs._losses import Losses
-from pamrs.diagnosis.fit._acting import acts_in, core_names, depends
-from pamrs.diagnosis.fit._held import (
+from pamrs.diagnosis.fit._effect_places import acts_in, core_names, depends
+from pamrs.diagnosis.fit._known_parameters import (
     ends_in_tolerances,
     in_tolerances,
     known_parameters,

@@ -17,7 +17,7 @@ import numpy as np
 from pamrs._arrays import Array, Index
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit._fitting import Problem, fit, free_baseline, residuals
-from pamrs.diagnosis.fit._held import known_parameters
+from pamrs.diagnosis.fit._known_parameters import known_parameters
 from pamrs.diagnosis.prepare import Block, Prepared, change
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig

@@ -32,8 +32,8 @@ from pamrs.diagnosis.fit._fitting import (
     stacked,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
-from pamrs.diagnosis.fit._shaken import VibrationResponse
 from pamrs.diagnosis.fit._spread import pieces_of, pieces_spread
+from pamrs.diagnosis.fit._vibration import VibrationResponse
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.effects import EffectParameter, Term, find_parameter
 from pamrs.errors import SimulationError

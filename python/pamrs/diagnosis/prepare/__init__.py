@@ -35,13 +35,13 @@ from pamrs.diagnosis.prepare._blocks import (
     unjudged_blocks,
 )
 from pamrs.diagnosis.prepare._overlap import Overlap, overlap, without_copies
-from pamrs.diagnosis.prepare._own import (
+from pamrs.diagnosis.prepare._own_values import (
     notes_on_own_values,
     varying,
     with_declared_values,
     with_own_values,
 )
-from pamrs.diagnosis.prepare._plausible import (
+from pamrs.diagnosis.prepare._plausibility import (
     check_plausible,
     check_sense,
     implausible,
@@ -60,14 +60,14 @@ from pamrs.diagnosis.prepare._signals import (
     unusable,
     warm_chambers,
 )
-from pamrs.diagnosis.prepare._slack import notes_on_slack
-from pamrs.diagnosis.prepare._units import noted_units, suspected_units
-from pamrs.diagnosis.prepare._unread import (
+from pamrs.diagnosis.prepare._slack_muscles import notes_on_slack
+from pamrs.diagnosis.prepare._tanks import (
     blocks_with_tanks,
     notes_on_tanks,
     tanks_without_gauge,
     with_tanks,
 )
+from pamrs.diagnosis.prepare._units import noted_units, suspected_units
 
 __all__ = [
     "AMBIENT",

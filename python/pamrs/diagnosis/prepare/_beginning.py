@@ -19,7 +19,6 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array, Index, Mask
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.prepare._before import TimeBefore
 from pamrs.diagnosis.prepare._blocks import (
     WINDOW_SAMPLES_PER_STATE,
     Block,
@@ -29,6 +28,7 @@ from pamrs.diagnosis.prepare._blocks import (
     residual,
 )
 from pamrs.diagnosis.prepare._signals import Prepared
+from pamrs.diagnosis.prepare._time_before import TimeBefore
 from pamrs.errors import SimulationError
 from pamrs.rig.schema import qualified
 

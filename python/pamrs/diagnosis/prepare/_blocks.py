@@ -14,8 +14,8 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array, Mask
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.prepare._before import TimeBefore
 from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of, thermometers_of
+from pamrs.diagnosis.prepare._time_before import TimeBefore
 from pamrs.effects import CLOSURE_OF
 from pamrs.rig import Rig
 from pamrs.rig.schema import keys_of, qualified

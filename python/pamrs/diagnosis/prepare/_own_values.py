@@ -13,7 +13,7 @@ from pamrs import _core
 from pamrs._arrays import Array
 from pamrs.diagnosis.prepare._blocks import Block, residual
 from pamrs.diagnosis.prepare._signals import Prepared
-from pamrs.diagnosis.prepare._unread import begins_at, with_tanks
+from pamrs.diagnosis.prepare._tanks import begins_at, with_tanks
 from pamrs.errors import SimulationError
 from pamrs.recordings import OwnValue, Recording
 from pamrs.report.text import format_number

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pamrs._arrays import Array
-from pamrs.diagnosis.fit._acting import acts_in
+from pamrs.diagnosis.fit._effect_places import acts_in
 from pamrs.diagnosis.fit._fitting import Events, Key, Problem, changes, stacked
 from pamrs.diagnosis.prepare import Residual
 from pamrs.effects import EffectParameter, Term
