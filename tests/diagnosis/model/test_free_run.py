@@ -22,9 +22,9 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from tests.diagnosis import synthetic
 from tests.diagnosis.asked import problem_of
+from tests.diagnosis.explain.test_assemble import NAMES, recorded
 from tests.diagnosis.kept import kept
 from tests.diagnosis.stands import WARM, vented
-from tests.diagnosis.test_assemble import NAMES, recorded
 from trial.marks import result_of as scored
 from trial.prove import valid_result
 

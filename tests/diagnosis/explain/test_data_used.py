@@ -24,7 +24,7 @@ from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig, differences, replay
 from tests.diagnosis.asked import SETTINGS, blocks_of, diagnosed
 from tests.diagnosis.noisy import SHOULDER, driven
-from tests.diagnosis.test_overlap import of, run
+from tests.diagnosis.prepare.test_overlap import of, run
 from tests.tables import text_of
 
 NAMES = ("valve_command", *SHOULDER)

@@ -18,7 +18,7 @@ from tests.diagnosis.frames import DT, played
 NOISE = frames.NOISE["length"]
 ROUGHLY = {"rest_length": 0.1, "rest_diameter": 0.01, "braid_angle": 0.5, "wall_thickness": 0.005}
 """Tolerances of a shape that nobody measured, in the units of the layout."""
-LAYOUT = Path(__file__).parents[2] / "cases" / "layouts" / "isometric_bench.toml"
+LAYOUT = Path(__file__).parents[3] / "cases" / "layouts" / "isometric_bench.toml"
 
 
 @pytest.mark.parametrize("drift", [0.0, 1.0, 20.0])

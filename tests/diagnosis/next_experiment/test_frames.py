@@ -29,7 +29,7 @@ from tests.diagnosis import frames
 from tests.diagnosis.asked import EXACT, SETTINGS
 from tests.diagnosis.frames import BENCH, PAIR, REGULATED, REST, VALVED
 
-HOME = Path(__file__).parents[2]
+HOME = Path(__file__).parents[3]
 OPEN = {
     "muscle_hysteresis": {"friction_constant": 2.0, "friction_pressure": 0.0, "presliding": 3e-3},
     "muscle_creep": {"stiffness": 300.0},

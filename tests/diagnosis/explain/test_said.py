@@ -24,9 +24,9 @@ from pamrs.experiments import experiments_of
 from pamrs.findings import BlockVerdict, BudgetTerm, ChannelError, FreeRun, FreeRunError
 from pamrs.report import text as words
 from tests.diagnosis.asked import SETTINGS, blocks_of, diagnosed, problem_of
+from tests.diagnosis.explain.test_assemble import NAMES, recorded
 from tests.diagnosis.kept import kept
 from tests.diagnosis.terms import by_text, of_texts, terms
-from tests.diagnosis.test_assemble import NAMES, recorded
 from tests.report.test_words import group, seen, stages
 
 LEAK = terms("leak_muscle")

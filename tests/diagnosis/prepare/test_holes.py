@@ -110,7 +110,7 @@ def test_a_wave_in_a_small_hole_is_bridged() -> None:
 
 
 BENCH = parse_rig(
-    (Path(__file__).parents[2] / "cases" / "layouts" / "isometric_bench.toml")
+    (Path(__file__).parents[3] / "cases" / "layouts" / "isometric_bench.toml")
     .read_text(encoding="utf-8")
     .replace('{ value = 27.6,  unit = "cm" }', '{ value = 27.6, unit = "cm", tol = 0.2 }')
 )

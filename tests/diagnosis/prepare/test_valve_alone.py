@@ -23,7 +23,7 @@ from tests.diagnosis import slopes
 from tests.diagnosis.asked import EXACT, SETTINGS, blocks_of, diagnosed
 from tests.diagnosis.noisy import driven
 
-RIG = load_rig(Path(__file__).parents[2] / "cases" / "layouts" / "eight_metres.toml")
+RIG = load_rig(Path(__file__).parents[3] / "cases" / "layouts" / "eight_metres.toml")
 NOISE = {"supply_pressure": 400.0, "line_pressure": 400.0, "muscle_pressure": 400.0}
 CHANNELS = ("valve_command", *NOISE)
 

@@ -18,9 +18,9 @@ from pamrs.diagnosis.prepare import (
     Prepared,
     _signals,
     available_blocks,
-    begun,
     noise_level,
     prepare,
+    signals_at_starts,
 )
 from pamrs.simulation import core_rig
 from tests.diagnosis.asked import SETTINGS, blocks_of
@@ -182,7 +182,7 @@ def test_every_joint_of_an_arm_starts_where_it_was() -> None:
     arms = [b for b in available_blocks(rig, tuple(channels)) if b.kind == "arm"]
     assert len(arms) == 2
     for block in arms:
-        given = begun(block, prepared, [0])
+        given = signals_at_starts(block, prepared, [0])
         for joint in (b.channel for b in arms):
             assert abs(given[joint][1][0]) <= abs(prepared.signals[joint][1][0]) < 0.012
 

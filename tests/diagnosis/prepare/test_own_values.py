@@ -18,7 +18,7 @@ from pamrs.rig import Rig, parse_rig
 from tests.diagnosis.asked import ROLES, problem_of
 from tests.diagnosis.noisy import SHOULDER as NOISE
 from tests.diagnosis.noisy import driven
-from tests.diagnosis.test_gauge_zeros import FED
+from tests.diagnosis.prepare.test_gauge_zeros import FED
 from tests.tables import rows_of
 
 DT = 0.005
