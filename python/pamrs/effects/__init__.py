@@ -16,7 +16,14 @@ from pamrs.effects._catalogue import (
     WORDS,
     ports_of,
 )
-from pamrs.effects._info import ClosureTerm, EffectInfo, EffectParameter, Form, SameData, Words
+from pamrs.effects._info import (
+    ClosureTerm,
+    EffectForm,
+    EffectInfo,
+    EffectParameter,
+    SameData,
+    Words,
+)
 from pamrs.effects.hypotheses import (
     NONE,
     PARAMETERS,
@@ -45,7 +52,7 @@ __all__ = [
     "ClosureTerm",
     "EffectInfo",
     "EffectParameter",
-    "Form",
+    "EffectForm",
     "Hypothesis",
     "SameData",
     "Term",

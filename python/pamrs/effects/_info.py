@@ -174,7 +174,7 @@ class Words:
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class EffectForm:
     """One form of an effect.
 
     Attributes
@@ -262,7 +262,7 @@ class EffectInfo:
     equation, fingerprint, separates : str
         Governing equation of the first form; what it looks like in recordings; what it is confused
         with and what separates them.
-    forms : tuple of Form
+    forms : tuple of EffectForm
         Its forms; the first one is meant where none is named.
     reference : str
         Where it comes from.
@@ -328,7 +328,7 @@ class EffectInfo:
     equation: str
     fingerprint: str
     separates: str
-    forms: tuple[Form, ...]
+    forms: tuple[EffectForm, ...]
     reference: str
     rivals: tuple[str, ...] = ()
     catalogue: bool = True
@@ -357,7 +357,7 @@ class EffectInfo:
         """The parameters of the first form."""
         return self.forms[0].parameters
 
-    def form(self, name: str = "") -> Form:
+    def form(self, name: str = "") -> EffectForm:
         """Form of the effect by its name.
 
         Parameters
@@ -367,7 +367,7 @@ class EffectInfo:
 
         Returns
         -------
-        Form
+        EffectForm
 
         Raises
         ------
@@ -406,11 +406,11 @@ class EffectInfo:
 
     @property
     def transient(self) -> bool:
-        """True where the first form is transient; see :attr:`Form.transient`."""
+        """True where the first form is transient; see :attr:`EffectForm.transient`."""
         return self.forms[0].transient
 
     @property
-    def lasting(self) -> tuple[Form, ...]:
+    def lasting(self) -> tuple[EffectForm, ...]:
         """Forms that act all the time, with the same parameters in all recordings."""
         return tuple(form for form in self.forms if not form.transient)
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import pamrs
 from pamrs.diagnosis import evidence
-from pamrs.diagnosis.evidence import BlockGroup, Candidate, Judged, judge
+from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, Judged, judge
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import Hypothesis, Term
@@ -26,7 +26,7 @@ BLOCKS = blocks_of(RIG, ("valve_command", *SHOULDER))
 HEALTHY = ("none", "parameters", "unlisted")
 
 
-def candidate(key: str, moved: dict[str, float] | None = None) -> Candidate:
+def candidate(key: str, moved: dict[str, float] | None = None) -> FittedHypothesis:
     """A hypothesis by its key, without a fit behind it."""
     return made_up(RIG, key, {}, moved=moved or {})
 

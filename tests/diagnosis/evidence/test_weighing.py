@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, possible_gain, weigh
+from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, possible_gain, weigh
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.evidence._verdicts import _capped
 from pamrs.diagnosis.evidence._weighing import loss_by_values
@@ -43,7 +43,7 @@ def hypothesis(
     left: float,
     correlation: float = 0.0,
     events: Events | None = None,
-) -> Candidate:
+) -> FittedHypothesis:
     """Effects with values and standard deviations that leave a share of the arm's mismatch."""
     for effect, values in effects.items():
         assert set(values) <= {p.name for form in EFFECTS[effect].forms for p in form.parameters}
@@ -57,7 +57,7 @@ def hypothesis(
     return made_up(RIG, "+".join(effects), kept, values, **fitted)
 
 
-def weighed(*found: Candidate) -> dict[str, float]:
+def weighed(*found: FittedHypothesis) -> dict[str, float]:
     return by_text(weigh([hypothesis({}, 1.0), *found], ARM, Weighing(0.985, 30.0, SETTINGS)))
 
 
@@ -138,7 +138,7 @@ def test_what_follows_a_curve_of_the_model_is_not_left_by_a_name() -> None:
     covariance = _Covariance([TIMES], [curve])
     error = rows_of(401.0) - rows_of(1.0)
 
-    def leaving_rows(found: Candidate, along: float, size: float) -> Candidate:
+    def leaving_rows(found: FittedHypothesis, along: float, size: float) -> FittedHypothesis:
         rows = along * curve[:, 0] + size * error + rows_of(1.0)
         return replace(found, likelihood=lambda: {"arm": covariance.likelihood([rows])})
 
@@ -189,7 +189,7 @@ def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
     assert trial.fit_events(Term("payload_change"), wrong) is None
 
 
-def with_wrong(found: Candidate, *names: str) -> Candidate:
+def with_wrong(found: FittedHypothesis, *names: str) -> FittedHypothesis:
     """The same beside values that are 7 tolerances below those of the rig file."""
     values, moved = dict.fromkeys(names, 0.72), dict.fromkeys(names, -7.0)
     scales = dict.fromkeys(names, 0.04)
@@ -230,7 +230,7 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
     asked: list[tuple[str, float]] = []
     keys = {**CREEP, **DAMPING, "external_torque": {"torque": (5.0, 0.1)}}
 
-    def shortly(starts: list[Start], _: Fit) -> Candidate:
+    def shortly(starts: list[Start], _: Fit) -> FittedHypothesis:
         (start,) = starts
         effect = start.effect.id
         asked.append((effect, start.free["size"]))

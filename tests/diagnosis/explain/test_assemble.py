@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import BlockGroup, Candidate, judge
+from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, judge
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.fit import fit, residuals
 from pamrs.diagnosis.model._conclude import _merged, _settled
@@ -102,7 +102,7 @@ def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> No
     )
     first = replace(moved, values=values, moved=tolerances)
     last = fit(arm, RIG, (), {}, {"arm": 1.0})
-    candidates = [Candidate((), found, {}, {}, 0.0) for found in (first, last)]
+    candidates = [FittedHypothesis((), found, {}, {}, 0.0) for found in (first, last)]
     groups = [
         BlockGroup(own.blocks, {}, {}, [c], {UNDECIDED: 1.0}, None, {}, [])
         for own, c in zip((chamber, arm), candidates, strict=True)

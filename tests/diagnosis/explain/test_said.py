@@ -12,7 +12,13 @@ import pytest
 
 import pamrs
 from pamrs import report
-from pamrs.diagnosis.evidence import BlockGroup, Candidate, drop_undetermined, judge, put_aside
+from pamrs.diagnosis.evidence import (
+    BlockGroup,
+    FittedHypothesis,
+    drop_undetermined,
+    judge,
+    put_aside,
+)
 from pamrs.diagnosis.fit import Events, Problem, fit, known_parameters, residuals
 from pamrs.diagnosis.model import _conclude, _free_run
 from pamrs.diagnosis.model._free_run import _OFF_NOISES
@@ -146,7 +152,7 @@ def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
     problem = problem_of(RIG, [recorded(RIG, "a", "fit")])
     blocks = problem.blocks
     white = dict.fromkeys(("supply", "chamber", "arm"), 1.0)
-    base = Candidate((), fit(problem, RIG, (), {}, white), {}, {}, 0.0)
+    base = FittedHypothesis((), fit(problem, RIG, (), {}, white), {}, {}, 0.0)
     quiet = judge([BlockGroup(blocks, {}, {}, [base], {UNDECIDED: 1.0}, None, {}, [])], SETTINGS)
     healthy = group("arm", "joint_angle", 0.9, "none")
 
@@ -224,7 +230,10 @@ def leak_group(strength: float) -> tuple[Problem, BlockGroup]:
     free = {"leak_muscle.conductance": strength}
     base = fit(problem, RIG, (), {}, {"chamber": 1.0})
     found = fit(problem, RIG, LEAK, free, {"chamber": 1.0})
-    candidates = [Candidate((), base, {}, {}, 0.0), Candidate(LEAK, found, {}, {}, 1.0)]
+    candidates = [
+        FittedHypothesis((), base, {}, {}, 0.0),
+        FittedHypothesis(LEAK, found, {}, {}, 1.0),
+    ]
     chances = of_texts({"leak_muscle": 0.9, "unlisted": 0.1})
     return problem, BlockGroup([chamber], {}, {}, candidates, chances, chamber, {}, [chamber])
 

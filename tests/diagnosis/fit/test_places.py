@@ -14,7 +14,7 @@ import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, weigh
+from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, weigh
 from pamrs.diagnosis.fit import Problem, acts_in, places_of, residuals, starts_of
 from pamrs.diagnosis.next_experiment import measurable
 from pamrs.diagnosis.noise import Excess
@@ -146,7 +146,7 @@ def test_sensitivities_are_those_of_the_effect_at_its_place() -> None:
         assert not np.any(found["chamber.extensor", "r0"].jacobian)
 
 
-def made_up(term: str, left: float, places: int) -> Candidate:
+def made_up(term: str, left: float, places: int) -> FittedHypothesis:
     """A hypothesis that leaves such a ratio of either chamber, fitted and held out."""
     effects = terms(term) if term else ()
     rig = PAIR
@@ -161,7 +161,7 @@ def made_up(term: str, left: float, places: int) -> Candidate:
     return replace(found, places=math.log(places))
 
 
-def weighed(*found: Candidate) -> dict[str, float]:
+def weighed(*found: FittedHypothesis) -> dict[str, float]:
     chambers = [b for b in blocks_of(PAIR) if b.kind == "chamber"]
     return by_text(weigh([made_up("", 40.0, 1), *found], chambers, Weighing(0.985, 30.0, SETTINGS)))
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import t
 
 import pamrs
-from pamrs.diagnosis.evidence import Candidate, Weighing, significant, weigh
+from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, significant, weigh
 from pamrs.diagnosis.fit import Problem, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import (
@@ -139,14 +139,14 @@ def test_noise_exceeds_its_limit_as_seldom_however_it_scatters(scatter: float) -
         assert seldom == pytest.approx(SETTINGS.noise_chance)
 
 
-def named(effect: str, ratio: float, scatter: float = 0.05, **values: float) -> Candidate:
+def named(effect: str, ratio: float, scatter: float = 0.05, **values: float) -> FittedHypothesis:
     """An effect, or none, that leaves so many times the noise level."""
     left = {"arm": Excess(ratio, 0.0, 0.5, 1.0, 1.0, 1.1 * np.exp(2.6 * scatter), scatter)}
     named = {f"{effect}.{name}": value for name, value in values.items()}
     return made_up(RIG, effect, left, named)
 
 
-def weighed(*given: Candidate) -> dict[str, float]:
+def weighed(*given: FittedHypothesis) -> dict[str, float]:
     """Probabilities by the text of each hypothesis of the arm."""
     arm = [blocks_of(RIG, NOISE)["arm"]]
     return by_text(weigh(given, arm, Weighing(0.985, 30.0, SETTINGS)))

@@ -11,7 +11,7 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import (
     Attempts,
     BlockGroup,
-    Candidate,
+    FittedHypothesis,
     Weighing,
     judge,
     weigh,
@@ -36,7 +36,7 @@ PROBLEM = Problem(BLOCKS, [], core_rig(RIG), SETTINGS)
 TRIAL = Attempts(PROBLEM, PROBLEM, RIG, {}, {}, BLOCKS)
 
 
-def candidate(key: str, supply: float, chamber: float, **values: float) -> Candidate:
+def candidate(key: str, supply: float, chamber: float, **values: float) -> FittedHypothesis:
     """A made-up hypothesis that leaves these excess variances."""
     model = RIG
     for term in Hypothesis.parse(key).terms:
@@ -53,7 +53,7 @@ def candidate(key: str, supply: float, chamber: float, **values: float) -> Candi
     return made_up(model, key, left, values, **known)
 
 
-def group(*found: Candidate) -> BlockGroup:
+def group(*found: FittedHypothesis) -> BlockGroup:
     start = candidate("", 2.5, 64.0)
     every = [start, *found]
     probabilities = weigh(every, BLOCKS, WEIGHING)
@@ -61,7 +61,7 @@ def group(*found: Candidate) -> BlockGroup:
     return BlockGroup(BLOCKS, start.fitted, start.fitted, every, probabilities, chamber, {}, BLOCKS)
 
 
-def leak(supply: float, chamber: float) -> Candidate:
+def leak(supply: float, chamber: float) -> FittedHypothesis:
     return candidate("supply_leak", supply, chamber, **{"supply_leak.conductance": 1e-11})
 
 
@@ -96,7 +96,7 @@ def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) 
     heat = candidate("heat_transfer", 2.5, 0.6, **{"heat_transfer.heat_transfer_coefficient": 20.0})
     asked: list[list[str]] = []
 
-    def united(self: Attempts, candidates: list[Candidate]) -> Fit:
+    def united(self: Attempts, candidates: list[FittedHypothesis]) -> Fit:
         asked.append(sorted(str(c.hypothesis) for c in candidates))
         return replace(candidates[0].fit, effects=terms("heat_transfer"))
 

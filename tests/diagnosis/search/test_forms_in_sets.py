@@ -13,7 +13,7 @@ from typing import cast
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, significant
+from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, significant
 from pamrs.diagnosis.fit import fit, form_in, starts_of
 from pamrs.diagnosis.model import owners_of_effects
 from pamrs.diagnosis.screen import screen
@@ -36,7 +36,7 @@ def trial() -> Attempts:
     return attempts(LEAKY, (8e5, 5e5, 3e5), 60.0)
 
 
-def hurried(trial: Attempts, evaluations: int) -> Candidate:
+def hurried(trial: Attempts, evaluations: int) -> FittedHypothesis:
     """A leak in its first form and the heat of the wall, fitted in so many evaluations."""
     starts = [starts_of(effect, sealed=True)[0] for effect in terms("leak_muscle", "heat_transfer")]
     free = {name: value for start in starts for name, value in start.free.items()}
@@ -75,7 +75,7 @@ def test_what_is_far_above_the_noise_is_so_by_its_size_or_its_power(trial: Attem
     (block,) = trial.suspects
     strong = _STRONG_RATIO
 
-    def left(ratio: float, systematic: float) -> Candidate:
+    def left(ratio: float, systematic: float) -> FittedHypothesis:
         kept = replace(base.fitted[block.name], ratio=ratio, systematic=systematic)
         return replace(base, fitted={block.name: kept}, held_out={block.name: kept})
 
@@ -84,10 +84,10 @@ def test_what_is_far_above_the_noise_is_so_by_its_size_or_its_power(trial: Attem
     assert far_above_noise(trial, left(1.0, 1.1 * math.sqrt(strong)))
 
 
-def group(std: dict[str, float], *effects: str) -> Candidate:
+def group(std: dict[str, float], *effects: str) -> FittedHypothesis:
     """A fit that knows its parameters so well."""
     own = SimpleNamespace(values=dict.fromkeys(std, 1.0), std=std)
-    return cast("Candidate", SimpleNamespace(fit=own, effects=terms(*effects)))
+    return cast("FittedHypothesis", SimpleNamespace(fit=own, effects=terms(*effects)))
 
 
 def test_the_group_that_knows_an_effect_best_has_its_values() -> None:

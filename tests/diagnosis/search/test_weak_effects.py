@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import BlockLikelihood, Candidate, Weighing, share_left, weigh
+from pamrs.diagnosis.evidence import BlockLikelihood, FittedHypothesis, Weighing, share_left, weigh
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.fit import Events
 from pamrs.diagnosis.noise import Excess
@@ -82,7 +82,7 @@ def test_a_payload_on_a_cord_is_named_with_its_length() -> None:
     assert abs(found.effects[0]["parameters"]["length"]["value"] - 0.23) < 0.01
 
 
-def candidate(key: str, left: float, **values: float) -> Candidate:
+def candidate(key: str, left: float, **values: float) -> FittedHypothesis:
     """A made-up set that leaves an excess of a block, fitted and held out; values of its only
     effect by their names alone.
     """
@@ -95,7 +95,7 @@ CHAMBER = [blocks_of(RIG, ("valve_command", *SHOULDER))["chamber"]]
 STOP = {"joint_end_stop.stiffness": 100.0}
 
 
-def weighed(*sets: Candidate, start: Candidate | None = None) -> dict[str, float]:
+def weighed(*sets: FittedHypothesis, start: FittedHypothesis | None = None) -> dict[str, float]:
     """Probabilities beside a baseline that leaves ten times the noise's variance in the chamber, of
     recordings of 30 s.
     """
@@ -154,7 +154,7 @@ def test_held_out_recordings_count_as_fitted_ones_do() -> None:
     swing = candidate("payload_swing", 0.0, swinging_share=0.04)
     start = candidate("", 10.0)
 
-    def named(found: Candidate) -> float:
+    def named(found: FittedHypothesis) -> float:
         return weighed(found, start=start)["payload_swing"]
 
     covariance = _Covariance([TIMES, TIMES], [np.empty((BINS, 0))] * 2)
@@ -162,7 +162,7 @@ def test_held_out_recordings_count_as_fitted_ones_do() -> None:
     def over_both(fitted: float, held: float) -> BlockLikelihood:
         return covariance.likelihood([rows_of(1.0 + left) for left in (fitted, held)])
 
-    def seen(fitted: float, held: float) -> Candidate:
+    def seen(fitted: float, held: float) -> FittedHypothesis:
         return replace(swing, likelihood=lambda: {"chamber": over_both(fitted, held)})
 
     start = replace(start, likelihood=lambda: {"chamber": over_both(10.0, 10.0)})
@@ -176,7 +176,7 @@ def test_events_have_to_explain_fitted_and_held_out_recordings_alike() -> None:
     event = {"torque": 4.0, "time": 3.0, "duration": 1.0}
     events = Events(Term("external_torque"), {"run": event})
 
-    def left(fitted: float, held: float, happened: Events | None) -> Candidate:
+    def left(fitted: float, held: float, happened: Events | None) -> FittedHypothesis:
         found = candidate("external_torque", fitted)
         ratio = {"chamber": Excess(1.0 + held, 0.0, 0.0, 1.0, 1.0, LIMIT)}
         return replace(found, held_out=ratio, fit=replace(found.fit, events=happened))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts, Candidate
+from pamrs.diagnosis.evidence import Attempts, FittedHypothesis
 from pamrs.diagnosis.fit import Problem, fit
 from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
 from pamrs.diagnosis.search import suspected_values
@@ -182,8 +182,8 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
 
 
 def test_a_parameter_beside_another_has_to_take_a_share_of_its_own() -> None:
-    def left(misfit: float) -> Candidate:
-        return cast("Candidate", SimpleNamespace(misfit=misfit))
+    def left(misfit: float) -> FittedHypothesis:
+        return cast("FittedHypothesis", SimpleNamespace(misfit=misfit))
 
     trial = cast("Attempts", SimpleNamespace(settings=SETTINGS))
     share = FURTHER_SHARE

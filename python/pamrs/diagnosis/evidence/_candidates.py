@@ -73,7 +73,7 @@ Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class FittedHypothesis:
     """A fitted hypothesis: effects, and values of the rig file that are wrong.
 
     Attributes
@@ -155,7 +155,7 @@ class BlockGroup:
         Gas blocks (supply, chamber) or the arm.
     nominal, baseline : dict of str to Excess
         Excess by block before and after the refit, on fitted recordings.
-    candidates : list of Candidate
+    candidates : list of FittedHypothesis
         The baseline first, then every set of effects tried.
     probabilities : dict of Hypothesis to float
         Over those that were fitted, `UNLISTED` and `UNDECIDED` (nothing missing here, or parameters
@@ -166,7 +166,7 @@ class BlockGroup:
         Noise levels.
     suspects : list of Block
         Blocks that keep an excess.
-    closure : Candidate or None
+    closure : FittedHypothesis or None
         Where no name is likely: a form of what is missing that predicts held-out recordings better
         than the baseline.
     sought : bool
@@ -178,17 +178,17 @@ class BlockGroup:
     blocks: list[Block]
     nominal: dict[str, Excess]
     baseline: dict[str, Excess]
-    candidates: list[Candidate]
+    candidates: list[FittedHypothesis]
     probabilities: dict[Hypothesis, float]
     mismatch: Block | None
     noise_level: dict[Key, NoiseLevel]
     suspects: list[Block]
-    closure: Candidate | None = None
+    closure: FittedHypothesis | None = None
     sought: bool = False
     predicted_gain: dict[Term, float] = field(default_factory=dict)
 
     @property
-    def best(self) -> Candidate:
+    def best(self) -> FittedHypothesis:
         """The most probable hypothesis (the baseline when none is)."""
         named = [c for c in self.candidates if c.terms]
         if self.mismatch is None or not named:
@@ -270,11 +270,11 @@ class Attempts:
         """Start of another fit from an effect as it was fitted."""
         return start_of(fitted, effect, LEAST_START)
 
-    def starts_of(self, candidate: Candidate) -> list[Start]:
+    def starts_of(self, candidate: FittedHypothesis) -> list[Start]:
         """Starts of another fit from each effect of a candidate."""
         return [self.start_of(candidate.fit, effect) for effect in candidate.effects]
 
-    def fit_events(self, effect: Term, beside: Candidate) -> Candidate | None:
+    def fit_events(self, effect: Term, beside: FittedHypothesis) -> FittedHypothesis | None:
         """Fit an effect with times of its own in every recording, next to a candidate's effects."""
         if effect.id in {e.id for e in beside.effects}:
             return None  # it would replace what it is to happen beside
@@ -285,7 +285,7 @@ class Attempts:
             return None  # it would take too long
         return self._attempt((*beside.terms, effect), lambda: self._fit_events(effect, beside))
 
-    def _fit_events(self, effect: Term, beside: Candidate) -> Candidate | None:
+    def _fit_events(self, effect: Term, beside: FittedHypothesis) -> FittedHypothesis | None:
         white = self.white
         model = with_effects_of(self.nominal, beside.fit.rig, self.held)
         fitted = fit_events(effect, self.inner, model, beside.fit, white)
@@ -313,7 +313,7 @@ class Attempts:
         return self.judge(effects, everywhere, residuals(self.outer, bare, events=events))
 
     def _refit_around_events(
-        self, fitted: Fit, beside: Candidate, autocorrelation: dict[str, float]
+        self, fitted: Fit, beside: FittedHypothesis, autocorrelation: dict[str, float]
     ) -> Fit:
         """Refit the persistent effects of a candidate while the events are held."""
         assert fitted.events is not None
@@ -345,7 +345,7 @@ class Attempts:
 
     def judge(
         self, effects: tuple[Term, ...], fitted: Fit, outside: dict[Key, Residual] | None = None
-    ) -> Candidate:
+    ) -> FittedHypothesis:
         """Judge a fit on held-out recordings, or on each recording as the others predict it."""
         blocks = self.inner.blocks
         inside = {b.name: self.excess(b, self.inner, fitted.residuals) for b in blocks}
@@ -365,7 +365,7 @@ class Attempts:
         ]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
-        return Candidate(
+        return FittedHypothesis(
             effects,
             fitted,
             after,
@@ -383,7 +383,7 @@ class Attempts:
 
     def fit_effects(
         self, starts: list[Start], warm: Fit, autocorrelation: dict[str, float]
-    ) -> Candidate | None:
+    ) -> FittedHypothesis | None:
         """Fit effects from one start each, residuals weighted by their own autocorrelation; None
         where the model cannot be run.
         """
@@ -393,7 +393,7 @@ class Attempts:
         settings, sealed = self.settings, self.nominal.model["valve"] is None
         limit = _SEALED_EVALUATIONS if sealed else settings.effect_evaluations
 
-        def fit_and_judge() -> Candidate:
+        def fit_and_judge() -> FittedHypothesis:
             best = self._fit(starts, autocorrelation, warm, evaluations=limit)
             weights = self.autocorrelation(best)
             if weights.largest > CORRELATED_VARIANCE:
@@ -405,7 +405,7 @@ class Attempts:
 
     def fit_shortly(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
-    ) -> Candidate | None:
+    ) -> FittedHypothesis | None:
         """Fit effects and freed parameters in a few steps: enough to see which of many sets are
         worth a whole fit; None where the model cannot be run.
         """
@@ -413,7 +413,7 @@ class Attempts:
         if not self.held.isdisjoint(e.id for e in effects):
             return None
 
-        def fit_and_judge() -> Candidate:
+        def fit_and_judge() -> FittedHypothesis:
             short = self._fit(starts, self.white, warm, wrong=wrong, evaluations=_FIRST_EVALUATIONS)
             return replace(self.judge(effects, short), wrong=wrong)
 
@@ -482,12 +482,12 @@ class Attempts:
             evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
         )
 
-    def fit_freed_shortly(self, names: tuple[str, ...]) -> Candidate | None:
+    def fit_freed_shortly(self, names: tuple[str, ...]) -> FittedHypothesis | None:
         """Fit the baseline with some parameters freed in a few steps, from where these go alone:
         enough to see which of many are worth a whole fit.
         """
 
-        def fit_and_judge() -> Candidate:
+        def fit_and_judge() -> FittedHypothesis:
             short = fit(
                 self.inner,
                 self.nominal,
@@ -504,7 +504,7 @@ class Attempts:
 
     def fit_freed(
         self, names: tuple[str, ...], baseline: Fit, share: float | None = None
-    ) -> Candidate | None:
+    ) -> FittedHypothesis | None:
         """Fit the baseline to its end with some parameters freed from their tolerance; None where
         it cannot be run.
 
@@ -528,14 +528,14 @@ class Attempts:
                 share=least,
             )
 
-        def fit_and_judge(alone: bool) -> Candidate:
+        def fit_and_judge(alone: bool) -> FittedHypothesis:
             first = fitted(self.white, self._fit_alone(names) if alone else baseline)
             autocorrelation = self.autocorrelation(first)
             correlated = autocorrelation.largest > CORRELATED_VARIANCE
             judged = self.judge((), fitted(autocorrelation, first) if correlated else first)
             return replace(judged, wrong=names)
 
-        best: Candidate | None = None
+        best: FittedHypothesis | None = None
         for alone in (True, False):
             judged = self._attempt(names, partial(fit_and_judge, alone))
             if judged is None:
@@ -548,7 +548,7 @@ class Attempts:
 
     def fit_together(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
-    ) -> Candidate | None:
+    ) -> FittedHypothesis | None:
         """Fit effects, each from a start, with some parameters freed from their tolerance; None
         where the model cannot be run, or where these parameters stay inside their tolerances.
         """
@@ -568,7 +568,7 @@ class Attempts:
         wrong: tuple[str, ...],
         evaluations: int,
         share: float | None = None,
-    ) -> Candidate:
+    ) -> FittedHypothesis:
         """Continue a fit of effects and freed parameters until its weights stop falling."""
         effects = tuple(start.effect for start in starts)
         weights, fitted = self.autocorrelation(warm), warm
@@ -588,7 +588,7 @@ class Attempts:
             CORRELATED_VARIANCE * now < weights[block] for block, now in weights_left.items()
         )
 
-    def fit_united(self, candidates: list[Candidate]) -> Fit | None:
+    def fit_united(self, candidates: list[FittedHypothesis]) -> Fit | None:
         """Fit all that several hypotheses name, each for its own block; None where it fails."""
         if any(c.fit.events is not None for c in candidates):
             return None
@@ -604,7 +604,7 @@ class Attempts:
             names, lambda: self._fit(starts, self.white, warm, wrong=wrong, share=FINAL_STEP_SHARE)
         )
 
-    def polish(self, candidate: Candidate) -> Candidate:
+    def polish(self, candidate: FittedHypothesis) -> FittedHypothesis:
         """Fit a candidate's persistent effects to the end.
 
         The first fit ends where little is to be gained; of sets that nearly say the same the one

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate
+from pamrs.diagnosis.evidence._candidates import BlockGroup, FittedHypothesis
 from pamrs.diagnosis.evidence._weighing import (
     fitted_sizes,
     is_near_none,
@@ -22,7 +22,9 @@ from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis
 _DETERMINED_STDS = 1.0
 
 
-def with_stated_std(problem: Problem, group: BlockGroup, candidate: Candidate) -> Candidate:
+def with_stated_std(
+    problem: Problem, group: BlockGroup, candidate: FittedHypothesis
+) -> FittedHypothesis:
     """Candidate with the standard deviations that are reported: by how much pieces of the
     recordings disagree, times ``spread_factor`` for parameters that no prior holds.
     """
@@ -77,7 +79,7 @@ def is_outside(fitted: Fit, name: str, settings: DiagnosisSettings) -> bool:
     return not value_may_be_inside(fitted, name, walls, _DETERMINED_STDS)
 
 
-def _has_undetermined_effect(candidate: Candidate) -> bool:
+def _has_undetermined_effect(candidate: FittedHypothesis) -> bool:
     """True where all fitted sizes of an effect together are within one standard deviation of zero.
     Effects with times of their own are left out: these times determine them.
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from scipy.stats import chi2
 
-from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate, significant
+from pamrs.diagnosis.evidence._candidates import BlockGroup, FittedHypothesis, significant
 from pamrs.diagnosis.evidence._weighing import price_of_term
 from pamrs.diagnosis.fit import Fit
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -29,7 +29,7 @@ from pamrs.effects import (
     effect_of,
 )
 
-_HEALTHY = (NONE, PARAMETERS)  # hypotheses of which nothing is missing
+_HEALTHY_HYPOTHESES = (NONE, PARAMETERS)  # hypotheses of which nothing is missing
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
 SHARED_ODDS = 6.0
 _ALIKE_STDS = 3.0  # [standard deviations] by which the values of one name in two groups may differ
@@ -70,7 +70,7 @@ class Judged:
         The most probable first.
     ambiguity : list of Hypothesis
         Those that are left open; empty when settled.
-    chosen : Candidate
+    chosen : FittedHypothesis
         The hypothesis that is named; the baseline where none is.
     """
 
@@ -78,7 +78,7 @@ class Judged:
     verdict: str
     probabilities: dict[Hypothesis, float]
     ambiguity: list[Hypothesis]
-    chosen: Candidate
+    chosen: FittedHypothesis
 
     @property
     def named(self) -> tuple[Term, ...]:
@@ -197,7 +197,7 @@ def _in_several(alone: Sequence[Mapping[Hypothesis, float]]) -> list[Term]:
 
 
 def _odds_shared(
-    term: Term, holders: Sequence[tuple[BlockGroup, Candidate]], settings: DiagnosisSettings
+    term: Term, holders: Sequence[tuple[BlockGroup, FittedHypothesis]], settings: DiagnosisSettings
 ) -> float:
     """Odds that one name acts in several groups of blocks, against a separate cause in each.
 
@@ -213,10 +213,10 @@ def _odds_shared(
     return SHARED_ODDS ** (len(holders) - 1) * math.exp(again)
 
 
-def _same_values(term: Term, candidates: Sequence[Candidate]) -> bool:
+def _same_values(term: Term, candidates: Sequence[FittedHypothesis]) -> bool:
     """True where all candidates give one term values that may be the same."""
 
-    def same(parameter: str, *both: Candidate) -> bool:
+    def same(parameter: str, *both: FittedHypothesis) -> bool:
         first, second = (c.fit.values[parameter] for c in both)
         stds = (c.fit.std.get(parameter, math.inf) for c in both)
         return are_alike(first, second, math.hypot(*stds))
@@ -252,7 +252,7 @@ def _judged(
     """Judge a group by its likeliest hypothesis; unlisted only if no name exceeds ``named``."""
     start = group.candidates[0]
     named = {h: p for h, p in probabilities.items() if h not in WITHOUT_NAME}
-    healthy = max(_HEALTHY, key=lambda h: probabilities.get(h, 0.0))
+    healthy = max(_HEALTHY_HYPOTHESES, key=lambda h: probabilities.get(h, 0.0))
     without = probabilities.get(UNLISTED, 0.0)
     best = max(named, key=lambda h: named[h], default=UNDECIDED)
     ambiguity = _left_open(probabilities, settings)
@@ -273,8 +273,8 @@ def _left_open(
     """Hypotheses that are left open, the most probable first; none where one is settled, `NONE` and
     `PARAMETERS` being one answer.
     """
-    healthy = sum(probabilities.get(h, 0.0) for h in _HEALTHY)
-    others = [p for h, p in probabilities.items() if h not in _HEALTHY]
+    healthy = sum(probabilities.get(h, 0.0) for h in _HEALTHY_HYPOTHESES)
+    others = [p for h, p in probabilities.items() if h not in _HEALTHY_HYPOTHESES]
     if max(healthy, *others, 0.0) > settings.settled:
         return []
     open_ones = [

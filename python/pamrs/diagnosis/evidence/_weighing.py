@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from pamrs.diagnosis.evidence._candidates import Candidate, significant
+from pamrs.diagnosis.evidence._candidates import FittedHypothesis, significant
 from pamrs.diagnosis.fit import Fit, Problem, form_in, moved_value, same_data_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
@@ -95,7 +95,7 @@ def probability_cap(fitted: Problem, mismatch: Block, rms_left: float, *, alone:
 
 
 def weigh(
-    candidates: list[Candidate], suspects: list[Block], weighing: Weighing
+    candidates: list[FittedHypothesis], suspects: list[Block], weighing: Weighing
 ) -> dict[Hypothesis, float]:
     """Probabilities of the hypotheses and of ``unlisted`` (docs/decisions/0014).
 
@@ -111,7 +111,7 @@ def weigh(
 
     Parameters
     ----------
-    candidates : list of Candidate
+    candidates : list of FittedHypothesis
         The baseline first, then every hypothesis.
     suspects : list of Block
         Blocks by which they are compared.
@@ -146,7 +146,9 @@ def weigh(
     return out
 
 
-def _share_taken(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
+def _share_taken(
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+) -> float:
     """Share of the power of the baseline's error that a hypothesis removes, 0 to 1."""
     before, after = (
         sum(hypothesis.likelihood()[b.name].size ** 2 for b in suspects)
@@ -155,7 +157,7 @@ def _share_taken(candidate: Candidate, baseline: Candidate, suspects: list[Block
     return min(1.0, max(0.0, 1.0 - after / before)) if before > 0.0 else 0.0
 
 
-def _counted(candidates: list[Candidate], suspects: list[Block]) -> float:
+def _counted(candidates: list[FittedHypothesis], suspects: list[Block]) -> float:
     """Share of the log evidence that counts (a power posterior): larger, the nearer the best
     hypothesis is to noise. Noise is independent from bin to bin; what no hypothesis explains is
     not.
@@ -166,8 +168,8 @@ def _counted(candidates: list[Candidate], suspects: list[Block]) -> float:
 
 
 def log_weight(
-    candidate: Candidate,
-    baseline: Candidate,
+    candidate: FittedHypothesis,
+    baseline: FittedHypothesis,
     suspects: list[Block],
     weighing: Weighing,
     share: float = _LEAST_SHARE,
@@ -179,25 +181,25 @@ def log_weight(
     return evidence - prior_loss(candidate, weighing)
 
 
-def prior_loss(candidate: Candidate, weighing: Weighing) -> float:
+def prior_loss(candidate: FittedHypothesis, weighing: Weighing) -> float:
     """Loss of a hypothesis before any data: its price, and values that its physics hardly has."""
     return price(candidate, weighing.settings) + _rarity(candidate, weighing)
 
 
-def _rarity(candidate: Candidate, weighing: Weighing) -> float:
+def _rarity(candidate: FittedHypothesis, weighing: Weighing) -> float:
     """Log odds that a hypothesis loses by values that its physics hardly has."""
     lost = loss_by_values(candidate)
     lost += _STANDING_PRICE * _lacks_drift(candidate, weighing.seconds)
     return lost + _UNSEEN_PRICE * _has_unseen_time(candidate, weighing.seconds)
 
 
-def _strain(candidate: Candidate) -> float:
+def _strain(candidate: FittedHypothesis) -> float:
     """Log odds that a hypothesis loses by moved parameters and by how warm gases began."""
     return 0.5 * _STRAIN_SHARE * (candidate.fit.strain + candidate.fit.start_strain)
 
 
 def _evidence(
-    candidate: Candidate, baseline: Candidate, suspects: list[Block], share: float
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block], share: float
 ) -> float:
     """Share of a hypothesis's log evidence in some blocks, at the best size of the unstated error;
     an error above a tenth of what the hypothesis explains costs more, the larger it is.
@@ -214,7 +216,7 @@ def _evidence(
     return total
 
 
-def _log_weight_unlisted(baseline: Candidate, suspects: list[Block], share: float) -> float:
+def _log_weight_unlisted(baseline: FittedHypothesis, suspects: list[Block], share: float) -> float:
     """Log weight of physics without a name, as if a right name explained all."""
     total = 0.0
     for likelihood in (baseline.likelihood()[block.name] for block in suspects):
@@ -223,7 +225,7 @@ def _log_weight_unlisted(baseline: Candidate, suspects: list[Block], share: floa
     return share * total - _UNLISTED_PRICE - _strain(baseline)
 
 
-def possible_gain(candidate: Candidate, suspects: list[Block]) -> float:
+def possible_gain(candidate: FittedHypothesis, suspects: list[Block]) -> float:
     """Largest rise of a candidate's log weight by an addition that leaves nothing but noise."""
     likelihoods = [candidate.likelihood()[block.name] for block in suspects]
     return _LEAST_SHARE * sum(
@@ -231,7 +233,9 @@ def possible_gain(candidate: Candidate, suspects: list[Block]) -> float:
     )
 
 
-def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
+def share_left(
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+) -> float:
     """Share of the baseline's excess variance that a set of effects leaves in held-out recordings.
 
     Held-out recordings that hardly show the mismatch cannot say how much of it is left: the fitted
@@ -251,7 +255,7 @@ def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block])
 
 
 def _excesses(
-    candidate: Candidate, baseline: Candidate, suspects: list[Block]
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
 ) -> list[tuple[float, float]]:
     """Excess variance that the baseline and a set leave, on fitted and on held-out recordings."""
 
@@ -264,7 +268,9 @@ def _excesses(
     ]
 
 
-def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> bool:
+def explains(
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+) -> bool:
     """True where a candidate leaves only noise, fitted and held out, of what was clearly more."""
     quiet = not any(
         significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out)
@@ -273,7 +279,7 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
     return quiet and after < _EXPLAINED_SHARE * before
 
 
-def is_absent(candidate: Candidate, walls: float) -> bool:
+def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
     """True where a wrong value may be inside its tolerances (`walls` of them), or all sizes of an
     effect together may be zero, within two standard deviations. A fit that goes on with such an
     effect may end lower without the effect's doing.
@@ -317,7 +323,7 @@ def is_near_none(distance: float, count: int, stds: float) -> bool:
     return bool(chi2.sf(distance, count) >= chi2.sf(stds**2, 1))
 
 
-def may_be_inside(candidate: Candidate, walls: float, stds: float) -> bool:
+def may_be_inside(candidate: FittedHypothesis, walls: float, stds: float) -> bool:
     """True where a value called wrong is inside its tolerances or less than `stds` outside."""
     return any(value_may_be_inside(candidate.fit, name, walls, stds) for name in candidate.wrong)
 
@@ -331,7 +337,7 @@ def value_may_be_inside(fitted: Fit, name: str, walls: float, stds: float) -> bo
     return beyond < stds * fitted.std.get(name, 0.0)
 
 
-def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
+def same_recordings(candidate: FittedHypothesis, effect: Term, seconds: float) -> bool:
     """True where an effect as fitted leaves the recordings that another effect would leave."""
     same = same_data_in(candidate.fit.rig, effect)
     if same is None:
@@ -353,7 +359,7 @@ def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
     )
 
 
-def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
+def _has_unseen_time(candidate: FittedHypothesis, seconds: float) -> bool:
     """True where a time constant is much longer than the recordings, or may be zero."""
     std = candidate.fit.std
     return any(
@@ -363,7 +369,7 @@ def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
     )
 
 
-def _lacks_drift(candidate: Candidate, seconds: float) -> bool:
+def _lacks_drift(candidate: FittedHypothesis, seconds: float) -> bool:
     """True where a clock drifts by less than its offset: that is a lag or a dead time."""
 
     def at_rest(effect: Term, same: SameData) -> bool:
@@ -375,7 +381,7 @@ def _lacks_drift(candidate: Candidate, seconds: float) -> bool:
     return any(at_rest(e, same) for e in candidate.effects for same in e.info.same_data)
 
 
-def loss_by_values(candidate: Candidate) -> float:
+def loss_by_values(candidate: FittedHypothesis) -> float:
     """Log odds that a set loses by values that its physics hardly has.
 
     A parameter with a prior loses by its distance from it, as by a Cauchy distribution: a value of
@@ -385,7 +391,7 @@ def loss_by_values(candidate: Candidate) -> float:
     return sum(_loss_by_value(candidate, name) for name in candidate.fit.effect_values)
 
 
-def _loss_by_value(candidate: Candidate, name: str) -> float:
+def _loss_by_value(candidate: FittedHypothesis, name: str) -> float:
     """Log odds that a set loses by the value of one parameter."""
     lost, value = 0.0, candidate.fit.values[name]
     effect = effect_of(name)
@@ -403,7 +409,7 @@ def _loss_by_value(candidate: Candidate, name: str) -> float:
     return lost
 
 
-def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
+def price(candidate: FittedHypothesis, settings: DiagnosisSettings) -> float:
     """Log odds paid for names, parameters, events, possible places, and wrong values."""
     total = sum(_own_price(candidate, term, settings) for term in candidate.terms)
     total += settings.further_price * len(candidate.terms) + candidate.places
@@ -412,7 +418,7 @@ def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
     return total + settings.parameter_price * happened
 
 
-def _own_price(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
+def _own_price(candidate: FittedHypothesis, term: Term, settings: DiagnosisSettings) -> float:
     """Log odds paid for an effect's parameters, or for how far a value of the file is wrong."""
     if term.id in candidate.wrong:
         return settings.wrong_price + candidate.outside_of(term.id, settings.most_tolerances)
@@ -420,7 +426,7 @@ def _own_price(candidate: Candidate, term: Term, settings: DiagnosisSettings) ->
     return settings.parameter_price * sum(not find_parameter(n).repeats for n in parameters)
 
 
-def price_of_term(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
+def price_of_term(candidate: FittedHypothesis, term: Term, settings: DiagnosisSettings) -> float:
     """Log odds that a set loses by one term before any data: price, values and place."""
     paid = _own_price(candidate, term, settings)
     if term.id in candidate.wrong:

@@ -12,7 +12,7 @@ import numpy as np
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
     BlockGroup,
-    Candidate,
+    FittedHypothesis,
     Judged,
     share_left,
     with_stated_std,
@@ -98,24 +98,22 @@ def assemble(
     known = models.chosen if named else models.starts
     owners = models.owners if named else owners_of_parameters(known)
     changed = models.added or any(j.wrong for j in judged)
+    inside, outside, errors = conclusion.inside, conclusion.outside, conclusion.errors
     gap = _gap(conclusion.table, _LEAST_GAP) if changed else None
     blocks = block_entries(
-        judged,
-        fitted,
-        conclusion.inside,
-        held,
-        conclusion.outside,
-        noise_level,
-        conclusion.own_errors,
+        judged, fitted, inside, held, outside, noise_level, conclusion.own_errors
     )
     forms = _forms(models, fitted)
-    stages = [(fitted, conclusion.inside)]
+    stages = [(fitted, inside)]
     if held is not fitted:
-        stages.insert(0, (held, conclusion.outside))
+        stages.insert(0, (held, outside))
     effects = _effects(judged, verdict, fitted)
     constants = notes_on_constants(conclusion.runs or [], [effect.id for effect in effects])
-    warm = {**conclusion.inside["after"], **conclusion.outside["after"]}
-    start_notes = notes_on_warm_starts(fitted.blocks, [*fitted.recordings, *held.recordings], warm)
+    start_notes = notes_on_warm_starts(
+        fitted.blocks,
+        [*fitted.recordings, *held.recordings],
+        {**inside["after"], **outside["after"]},
+    )
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
@@ -123,23 +121,16 @@ def assemble(
         ambiguity=[hypothesis.words for hypothesis in conclusion.ambiguity],
         probabilities={str(h): p for h, p in conclusion.probabilities.items()},
         parameters=_parameters(nominal, known, owners),
-        fit=FitErrors(conclusion.errors["fit"], conclusion.errors["held_out"], gap),
+        fit=FitErrors(errors["fit"], errors["held_out"], gap),
         warnings=constants,
         rig=models.final
         if verdict == "none"
         else with_std(models.final, nominal, models.chosen, models.owners),
-        traces=_traces(fitted, held, conclusion.inside, conclusion.outside),
+        traces=_traces(fitted, held, inside, outside),
         blocks=[*blocks, *map(not_judged, unjudged)],
         budget=conclusion.budget,
         unexplained=unexplained(
-            judged,
-            blocks,
-            stages,
-            noise_level,
-            conclusion.budget,
-            forms,
-            nominal,
-            conclusion.errors,
+            judged, blocks, stages, noise_level, conclusion.budget, forms, nominal, errors
         ),
         wrong_parameters=_wrong_parameters(models, fitted, conclusion.table),
         measured=list(case.channels),
@@ -161,7 +152,7 @@ def assemble(
     ]
     diagnosis = replace(diagnosis, warnings=[*constants, *notes, *start_notes])
     picture = _picture(diagnosis.answer.block, conclusion, fitted)
-    where = words.where(diagnosis.answer, fitted, judged, picture, conclusion.errors)
+    where = words.where(diagnosis.answer, fitted, judged, picture, errors)
     return _with_text(replace(answered(diagnosis), where=where), case, judged, forms)
 
 
@@ -300,7 +291,7 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
     """The effects that are named, the most probable first; without a name those that come
     closest.
     """
-    named: dict[Term, tuple[float, Candidate]] = {}
+    named: dict[Term, tuple[float, FittedHypothesis]] = {}
     chosen = [j.chosen for j in judged]
     owners = owners_of_effects(chosen)
     in_set = problem.settings.in_set
@@ -370,7 +361,7 @@ def _wrong_parameters(
     return entries
 
 
-def _events(effect: Term, candidate: Candidate) -> list[dict[str, Any]]:
+def _events(effect: Term, candidate: FittedHypothesis) -> list[dict[str, Any]]:
     """Events of an effect in each recording, one entry for each event."""
     events = candidate.fit.events
     if events is None or events.effect != effect:
@@ -391,7 +382,9 @@ def _events(effect: Term, candidate: Candidate) -> list[dict[str, Any]]:
     return entries
 
 
-def _effect_parameters(effect: Term, candidate: Candidate) -> dict[str, EffectParameterFound]:
+def _effect_parameters(
+    effect: Term, candidate: FittedHypothesis
+) -> dict[str, EffectParameterFound]:
     """Parameters of an effect, fitted or chosen."""
     rig = candidate.fit.rig
     unknown_volume = bool(unknown_volumes(rig))
@@ -426,7 +419,7 @@ _REFERENCE_DENSITY = 1.185
 """Density of air in the reference state of ISO 6358 [kg/m3], to which conductances refer."""
 
 
-def _emptying(effect: Term, candidate: Candidate) -> dict[str, EffectParameterFound]:
+def _emptying(effect: Term, candidate: FittedHypothesis) -> dict[str, EffectParameterFound]:
     """Time constant [s] of a sealed chamber emptying by a conductance; conductance per volume."""
     gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
     out: dict[str, EffectParameterFound] = {}
@@ -462,7 +455,7 @@ def _interval(value: float, std: float, lower: float) -> list[float]:
 
 
 def _parameters(
-    nominal: Rig, candidates: list[Candidate], owners: dict[str, int]
+    nominal: Rig, candidates: list[FittedHypothesis], owners: dict[str, int]
 ) -> dict[str, ParameterFound]:
     """Parameters of the baseline, each from the group that determines it best."""
     out: dict[str, ParameterFound] = {}

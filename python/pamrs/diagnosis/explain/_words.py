@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pamrs.channels import channel_of, unit_of
-from pamrs.diagnosis.evidence import Candidate, Judged, parameters_at_wall
+from pamrs.diagnosis.evidence import FittedHypothesis, Judged, parameters_at_wall
 from pamrs.diagnosis.explain._conditions import Picture
 from pamrs.diagnosis.fit import Problem, concerns
 from pamrs.diagnosis.model import spoiled_channels
@@ -235,7 +235,7 @@ def worse(table: dict[str, ChannelError]) -> list[str]:
     return out
 
 
-def reservations(chosen: list[Candidate]) -> list[str]:
+def reservations(chosen: list[FittedHypothesis]) -> list[str]:
     """Warnings of parameters that a fit with a named effect moved far."""
     named = [c for c in chosen if any(effect.id in CATALOGUE for effect in c.effects)]
     moved = {

@@ -11,7 +11,7 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.channels import unit_of
-from pamrs.diagnosis.evidence import Candidate, Judged, significant
+from pamrs.diagnosis.evidence import FittedHypothesis, Judged, significant
 from pamrs.diagnosis.fit import (
     Events,
     Key,
@@ -367,7 +367,7 @@ class _Shares:
         return float(shares[0]), [float(low), float(high)]
 
 
-def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
+def owners_of_parameters(candidates: list[FittedHypothesis]) -> dict[str, int]:
     """Number of the group that determines each parameter best, where several have it (sensors'
     zeros): the one with the least standard deviation; of those that tell hardly more than the file,
     the last one along the chain, whose output it is.
@@ -389,7 +389,7 @@ def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
     return owners
 
 
-def owners_of_effects(candidates: list[Candidate]) -> dict[Term, int]:
+def owners_of_effects(candidates: list[FittedHypothesis]) -> dict[Term, int]:
     """Number of the group that determines each effect best, where several have it (a clock moves
     what arm and chamber see): the one with the least mean logarithm of standard deviations.
     """
@@ -402,7 +402,7 @@ def owners_of_effects(candidates: list[Candidate]) -> dict[Term, int]:
     return owners
 
 
-def _doubt(candidate: Candidate, effect: Term) -> float:
+def _doubt(candidate: FittedHypothesis, effect: Term) -> float:
     """Mean logarithm of the standard deviations of an effect's parameters, in typical sizes."""
     std = candidate.fit.std
     logs = []

@@ -15,7 +15,7 @@ from scipy.linalg import block_diag
 from pamrs._arrays import Array
 from pamrs.diagnosis.evidence import (
     BlockGroup,
-    Candidate,
+    FittedHypothesis,
     Judged,
     autocorrelation_of,
     case_ambiguity,
@@ -75,7 +75,7 @@ class Models:
     ----------
     judged : list of Judged
         The groups, what they name fitted beside what other groups know better.
-    starts, chosen : list of Candidate
+    starts, chosen : list of FittedHypothesis
         The baseline of each group, and what goes into the final model, with standard deviations
         that hold for equations that are not quite the rig's.
     owners : dict of str to int
@@ -87,8 +87,8 @@ class Models:
     """
 
     judged: list[Judged]
-    starts: list[Candidate]
-    chosen: list[Candidate]
+    starts: list[FittedHypothesis]
+    chosen: list[FittedHypothesis]
     owners: dict[str, int]
     nominal: Rig
     baseline: Rig
@@ -398,7 +398,7 @@ def _known(models: Models) -> KnownValues:
     return KnownValues((*names, *rest), np.array(values), block_diag(*parts))
 
 
-def _model_of(judged: Judged, start: Candidate) -> Candidate:
+def _model_of(judged: Judged, start: FittedHypothesis) -> FittedHypothesis:
     """Candidate of a group for the model: what is named, else a nameless form, else parameters."""
     if judged.named or judged.wrong:
         return judged.chosen
@@ -421,7 +421,7 @@ def _models_of(
     likely, least = [], problem.settings.simulated_from
     healthy = {h.rest: p for h, p in probabilities.items() if h in (NONE, PARAMETERS)}
 
-    def model(chosen: list[Candidate]) -> Rig:
+    def model(chosen: list[FittedHypothesis]) -> Rig:
         stated = _widened(problem, judged, chosen)
         return with_std(_merged(nominal, chosen), nominal, stated, owners_of_parameters(chosen))
 
@@ -441,7 +441,7 @@ def _models_of(
     return likely
 
 
-def _inside(group: BlockGroup, wanted: frozenset[Term]) -> Candidate:
+def _inside(group: BlockGroup, wanted: frozenset[Term]) -> FittedHypothesis:
     """The most probable hypothesis of a group that names nothing else than what is wanted; the
     baseline where there is none.
     """
@@ -452,8 +452,8 @@ def _inside(group: BlockGroup, wanted: frozenset[Term]) -> Candidate:
 
 
 def _settled(
-    nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]
-) -> list[Candidate]:
+    nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[FittedHypothesis]
+) -> list[FittedHypothesis]:
     """Refit groups with sensors' zeros held that another group determines better and differently.
 
     A rig has one zero of a sensor; the other values of a fit are right beside its own only.
@@ -499,12 +499,14 @@ def _settled(
     return settled_candidates
 
 
-def _widened(problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
+def _widened(
+    problem: Problem, judged: list[Judged], chosen: list[FittedHypothesis]
+) -> list[FittedHypothesis]:
     """The fits of the groups with the standard deviations that are stated."""
     return [with_stated_std(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
 
 
-def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
+def _merged(nominal: Rig, candidates: list[FittedHypothesis]) -> Rig:
     """One rig from the groups' fits; where two have a value of their own, that of the group that
     knows it best.
     """
@@ -515,7 +517,9 @@ def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
     return with_known(rig, {name: candidates[k].fit.values[name] for name, k in owners})
 
 
-def _added(nominal: Rig, candidates: list[Candidate]) -> Iterator[tuple[Candidate, dict[str, Any]]]:
+def _added(
+    nominal: Rig, candidates: list[FittedHypothesis]
+) -> Iterator[tuple[FittedHypothesis, dict[str, Any]]]:
     """Effects that the fits have and the nominal model has not, each from the fit that knows it
     best.
     """
@@ -526,7 +530,9 @@ def _added(nominal: Rig, candidates: list[Candidate]) -> Iterator[tuple[Candidat
                 yield candidate, entry
 
 
-def with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[str, int]) -> Rig:
+def with_std(
+    rig: Rig, nominal: Rig, candidates: list[FittedHypothesis], owners: dict[str, int]
+) -> Rig:
     """A model with the standard deviations of its effects; of one that the nominal model held, as
     the group has it that knows it best.
     """

@@ -63,7 +63,7 @@ class KnownValues:
 _FREED = ("muscle_force", "joint_torque", "temperature")
 """Channels whose constant is fitted to each recording."""
 
-_COMMANDS = ("valve_command", "supply_command", "pressure_command")
+_RUN_COMMANDS = ("valve_command", "supply_command", "pressure_command")
 """Channels that drive a free run."""
 
 
@@ -353,7 +353,7 @@ def _with_late_commands(recording: Recording, samples: float) -> Recording:
     moved = {
         name: np.interp(at - samples, at, values)
         for name, values in recording.channels.items()
-        if channel_of(name) in _COMMANDS
+        if channel_of(name) in _RUN_COMMANDS
     }
     return replace(recording, channels=recording.channels | moved)
 

@@ -37,7 +37,7 @@ _GAUGES = ("muscle_pressure", "joint_angle")
 _GAUGE_SHARE = 0.1
 """That of a gauge's range over that of a block: gauges are linear to a tenth of a percent."""
 _MOTION = ("joint_angle", "length")
-_COMMANDS = with_trait("driven")
+_DRIVEN_COMMANDS = with_trait("driven")
 
 
 def model_error(rig: Rig, usual: float) -> Stated:
@@ -173,7 +173,9 @@ def _flow_errors(block: Block, ranges: OperatingRanges, stated: Stated) -> list[
     if block.kind not in _FLOWS or block.channel not in ranges:
         return []
     name = block_of(block.channel)
-    command = next((n for n in block.drives if channel_of(n) in _COMMANDS and n in ranges), None)
+    command = next(
+        (n for n in block.drives if channel_of(n) in _DRIVEN_COMMANDS and n in ranges), None
+    )
     errors = [
         (block.channel, _shares(stated, _FLOWS[block.kind], name)),
         (command or block.channel, _shares(stated, ("valve",), name)),

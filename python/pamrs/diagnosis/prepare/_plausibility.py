@@ -76,7 +76,7 @@ _SENSE_WRONG = 1.0
 _SENSE_RIGHT = 0.4
 
 
-_PRESSURES = with_trait("pressure")
+_PRESSURE_CHANNELS = with_trait("pressure")
 _DEGREES = 180.0 / math.pi  # of a radian
 _MOST_ITEMS = 12
 """Findings that a message lists."""
@@ -184,7 +184,7 @@ def without_impossible(
         channels = dict(recording.channels)
         for name in recording.channels:
             low, high = limits.get(name, (-math.inf, math.inf))
-            if channel_of(name) in (*_PRESSURES, "supply_command"):
+            if channel_of(name) in (*_PRESSURE_CHANNELS, "supply_command"):
                 low, high = _LEAST_GAUGE_PRESSURE, settings.most_pressure
             bad = mask[name] & ((channels[name] < low) | (channels[name] > high))
             table = rig.tables("valve").get(block_of(name))

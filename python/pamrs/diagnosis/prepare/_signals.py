@@ -48,7 +48,7 @@ _ROUNDED_STILL = 0.03
 # noise in converter steps below which rounding is not white; at half a step it nearly is
 _ROUNDED_SHARE = 0.5
 # fewest samples of a recording: noise takes eleven, a leak of a shut chamber shows in sixteen
-_LEAST_SAMPLES = 12
+_RECORDING_LEAST_SAMPLES = 12
 _LEAST_CHANNEL_SAMPLES = 11  # fewest usable samples of a channel
 _LEAST_CHANNEL_SHARE = 0.2  # share of a channel's samples that must be usable
 
@@ -60,7 +60,7 @@ _TERMS = 4
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels at which a rig is cut; of a block with a name its name stands behind it."""
-COMMANDS = with_trait("driven")
+DRIVEN_COMMANDS = with_trait("driven")
 
 
 @dataclass(frozen=True, eq=False)
@@ -563,7 +563,7 @@ def unusable(recording: Recording, rig: Rig, core: _core.Rig, settings: Diagnosi
             f"it has no channel {' or '.join(wanted)}, without which no block can be cut out; it "
             f"has: {', '.join(recording.channels)}"
         )
-    length = max(_LEAST_SAMPLES, filter_length(recording.sample_time, settings))
+    length = max(_RECORDING_LEAST_SAMPLES, filter_length(recording.sample_time, settings))
     if len(recording) < length:
         return f"it has {len(recording)} samples; at least {length} are needed for a diagnosis"
     if why := uncommanded(recording, rig, core.inputs):

@@ -14,7 +14,7 @@ from pamrs.diagnosis.prepare._signals import Prepared
 _MOST_MOVED = 2e4
 
 
-_PRESSURES: Final = with_trait("pressure")
+_PRESSURE_CHANNELS: Final = with_trait("pressure")
 
 
 class TimeBefore(NamedTuple):
@@ -46,7 +46,7 @@ class TimeBefore(NamedTuple):
         for name, (value, slope) in signals.items():
             first, rate = (float(array[0]) for array in prepared.with_starts(name, [0]))
             was = np.full(self.samples, first)
-            if channel_of(name) in _PRESSURES:
+            if channel_of(name) in _PRESSURE_CHANNELS:
                 was -= np.clip(rate * back, -_MOST_MOVED, _MOST_MOVED)
                 was = np.maximum(was, min(first, -_MOST_MOVED))
             extended[name] = (

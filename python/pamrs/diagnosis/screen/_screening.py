@@ -38,7 +38,7 @@ from pamrs.rig.schema import BLOCKS
 
 _MOST_LINEAR = 8.0  # [typical sizes] largest size at which a linear gain is relied on (decision 13)
 # [typical sizes] smallest start: a compressor may deliver 500 times less (decision 20)
-_LEAST_SIZE = 0.002
+_LEAST_SIGNATURE_SIZE = 0.002
 # [sizes tried] size below which (and from most_size) the signature is taken again there
 _REPEAT_BELOW = 0.3
 # signatures of one start at the most, each at the size that the last one suggested
@@ -168,7 +168,7 @@ def _best_size(along: float, power: float, start: Start) -> tuple[float, float]:
     """
     if power < _INVISIBLE:
         return 0.0, 0.0
-    low = -_MOST_LINEAR if start.signed else _LEAST_SIZE
+    low = -_MOST_LINEAR if start.signed else _LEAST_SIGNATURE_SIZE
     size = float(np.clip(-along / power, low, _MOST_LINEAR)) if start.scalable else 1.0
     return size, -2.0 * size * along - size**2 * power
 

@@ -418,7 +418,7 @@ def _select(
         q, _ = np.linalg.qr(np.concatenate([frame.freedom, np.eye(b)]))
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
-    crossed = _CrossValidation.of(frame, rows, unit)
+    crossed = _LeaveOneOut.of(frame, rows, unit)
     chosen = _Selection(candidates, target, wide, _LEAST_POWER)
     for k, candidate in enumerate(candidates):
         if candidate.name in present and usable[k] and chosen.power(k) > _LEAST_POWER:
@@ -540,7 +540,7 @@ def _pruned(
 
 
 @dataclass(frozen=True, eq=False)
-class _CrossValidation:
+class _LeaveOneOut:
     """Normal equations of baseline and terms by recording, to leave one out at a time.
 
     Attributes
@@ -555,10 +555,10 @@ class _CrossValidation:
     prior: Array
 
     @staticmethod
-    def of(frame: _StackedFit, rows: Array, unit: Array) -> _CrossValidation:
+    def of(frame: _StackedFit, rows: Array, unit: Array) -> _LeaveOneOut:
         everything = np.concatenate([frame.freedom, unit, rows[:, None]], axis=1)
         parts = [everything[frame.recording == k] for k in np.unique(frame.recording)]
-        return _CrossValidation(np.array([part.T @ part for part in parts]), frame.moved)
+        return _LeaveOneOut(np.array([part.T @ part for part in parts]), frame.moved)
 
     def left_out(self, terms: Sequence[int]) -> float:
         """Misfit of each recording by the baseline and terms that the others ask for, summed; with

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from pamrs.diagnosis.evidence import Candidate
+from pamrs.diagnosis.evidence import FittedHypothesis
 from pamrs.diagnosis.fit import Start, concerns, starts_of
 from pamrs.diagnosis.screen import STRONG_SIZES
 from pamrs.diagnosis.search._sets import Search
 from pamrs.effects import Hypothesis, Term
 
 
-def fit_considered(search: Search) -> list[Candidate]:
+def fit_considered(search: Search) -> list[FittedHypothesis]:
     """Fit what of each hypothesis that the caller asks for acts in the blocks of a mismatch."""
-    trial, fitted = search.trial, list[Candidate]()
+    trial, fitted = search.trial, list[FittedHypothesis]()
     for hypothesis in trial.inner.considered:
         acting = [t for t in hypothesis.terms if any(concerns(t, b) for b in trial.suspects)]
         # what may happen at times of its own is looked for beside what lasts
@@ -30,7 +30,7 @@ def fit_considered(search: Search) -> list[Candidate]:
     return fitted
 
 
-def _add_effect(search: Search, beside: Candidate, effect: Term) -> Candidate | None:
+def _add_effect(search: Search, beside: FittedHypothesis, effect: Term) -> FittedHypothesis | None:
     """Add an effect to a set, from the start of each form that leaves least in a few steps."""
     info, trial = effect.info, search.trial
     if beside.fit.events is not None:
@@ -38,7 +38,7 @@ def _add_effect(search: Search, beside: Candidate, effect: Term) -> Candidate | 
     if not info.lasting:
         return trial.fit_events(effect if info.own else Term(effect.id), beside)
     starts = trial.starts_of(beside)
-    short: dict[str, list[Candidate]] = {}
+    short: dict[str, list[FittedHypothesis]] = {}
     for one in _possible_starts(search, beside, effect):
         candidate = trial.fit_shortly([*starts, one], beside.fit, beside.wrong)
         if candidate is not None:
@@ -50,7 +50,7 @@ def _add_effect(search: Search, beside: Candidate, effect: Term) -> Candidate | 
     return max((c for c in ended if c is not None), key=search.weight, default=None)
 
 
-def _possible_starts(search: Search, beside: Candidate, effect: Term) -> list[Start]:
+def _possible_starts(search: Search, beside: FittedHypothesis, effect: Term) -> list[Start]:
     """Starts of an effect next to a set: those of the screen, which knows resonances and places of
     contact, and those of the catalogue in several sizes.
     """

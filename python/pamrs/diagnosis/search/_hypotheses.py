@@ -18,7 +18,7 @@ from pamrs.diagnosis.evidence import (
     SHARED_ODDS,
     Attempts,
     BlockGroup,
-    Candidate,
+    FittedHypothesis,
     Weighing,
     are_alike,
     explains,
@@ -120,8 +120,8 @@ _NEAR_START = 0.6
 _NEAR_FORM = 0.3  # share of the best gain that fits another form: strong effects are not linear
 _MOST_FORMS = 4  # forms of an effect that are fitted
 _EFFECTS_WITH_STARTS = 3  # effects of which more than one start is fitted (decision 13)
-_REFITTED = 0.3  # share of the work on some blocks that their refit is
-_SCREENED = 0.6  # share that it is up to the fits of what the screen found
+_REFIT_SHARE = 0.3  # share of the work on some blocks that their refit is
+_SCREEN_SHARE = 0.6  # share that it is up to the fits of what the screen found
 # share of the error that was taken below which what a hypothesis leaves is clearly less
 _CLEARLY_LESS = 0.5
 _POLISH_FROM = 0.03  # probability from which a hypothesis is fitted to its end (decision 22)
@@ -238,7 +238,9 @@ def _begin_part(
     return OnlyNoise(refit, refit.group([refit.start], {UNDECIDED: 1.0}, None), tell)
 
 
-def _find_hidden_by_values(refit: _Refit, tell: Say, *, effects: bool) -> dict[Candidate, float]:
+def _find_hidden_by_values(
+    refit: _Refit, tell: Say, *, effects: bool
+) -> dict[FittedHypothesis, float]:
     """Hypotheses of blocks whose baseline leaves only noise, but moves parameters for it, each with
     the logarithm of what it costs: values that the file may be wrong about and, if asked for,
     effects, which the values may have followed.
@@ -272,7 +274,7 @@ class _Refit:
         Weights of the autocorrelation that it leaves.
     nominal_excess : dict of str to Excess
         What the nominal model leaves of the recordings to fit, by block.
-    start : Candidate
+    start : FittedHypothesis
         The refitted baseline as a hypothesis.
     held_out_alone : list of Block
         Blocks whose excess the held-out recordings alone show.
@@ -287,7 +289,7 @@ class _Refit:
     white_fit: Fit
     autocorrelation: dict[str, float]
     nominal_excess: dict[str, Excess]
-    start: Candidate
+    start: FittedHypothesis
     held_out_alone: list[Block]
     nominal_residuals: dict[Key, Residual]
     error: tuple[dict[Key, NoiseLevel], dict[str, float]]
@@ -297,7 +299,7 @@ class _Refit:
         """True where the size of the model's error is stated: by the rig file, or as none."""
         return _error_is_given(self.trial.nominal, self.trial.settings)
 
-    def with_smaller_error(self, candidates: list[Candidate]) -> _Refit | None:
+    def with_smaller_error(self, candidates: list[FittedHypothesis]) -> _Refit | None:
         """Refit with the smaller error that the likeliest hypothesis leaves the model, or None."""
         trial, (usual, sizes) = self.trial, self.error
         each = [(c, *error_sizes(trial.inner, c.fit.residuals, usual)) for c in candidates]
@@ -317,7 +319,7 @@ class _Refit:
 
     def group(
         self,
-        candidates: list[Candidate],
+        candidates: list[FittedHypothesis],
         probabilities: dict[Hypothesis, float],
         mismatch: Block | None,
     ) -> BlockGroup:
@@ -413,13 +415,15 @@ def _refit_with_error_sizes(
     suspects = [b for b in blocks if significant(fitted_excess[b.name]) or b in apart_with_doubt]
     trial = Attempts(inner, outer, nominal, noise_level, held_out_excess, suspects)
     likelihood = trial.likelihood_of(baseline.residuals, outside)
-    start = Candidate((), baseline, held_out_excess, fitted_excess, 0.0, likelihood=likelihood)
+    start = FittedHypothesis(
+        (), baseline, held_out_excess, fitted_excess, 0.0, likelihood=likelihood
+    )
     return _Refit(
         trial, white_fit, autocorrelation, nominal_excess, start, apart, nominal_residuals, error
     )
 
 
-def _price(candidate: Candidate, trial: Attempts) -> float:
+def _price(candidate: FittedHypothesis, trial: Attempts) -> float:
     """Log odds that the parameters of a hypothesis cost: their moves, and for each the half
     logarithm of the number of bins (Schwarz), which it could have fitted by chance.
     """
@@ -433,7 +437,7 @@ def _price(candidate: Candidate, trial: Attempts) -> float:
     return 0.5 * (moved + count * math.log(bins)) + terms
 
 
-def _healthy_group(refit: _Refit, common: Candidate) -> BlockGroup:
+def _healthy_group(refit: _Refit, common: FittedHypothesis) -> BlockGroup:
     """Group whose baseline, fitted to all recordings, leaves only noise in them."""
     trial = refit.trial
     # what the nominal model leaves in the held-out ones is what the parameters are moved for
@@ -492,7 +496,7 @@ class _SearchState:
         Screen and weights.
     mismatch : Block
         The block that keeps most.
-    mistaken : list of Candidate
+    mistaken : list of FittedHypothesis
         Values that may be wrong.
     per_recording, transient : list of Term
         Effects with sizes, and with times, of their own in each recording.
@@ -500,7 +504,7 @@ class _SearchState:
 
     search: Search
     mismatch: Block
-    mistaken: list[Candidate]
+    mistaken: list[FittedHypothesis]
     per_recording: list[Term]
     transient: list[Term]
 
@@ -519,7 +523,7 @@ def _screen_mismatch(refit: _Refit, tell: Say) -> _SearchState:
     suspects, now = trial.suspects, start.fitted
     mismatch = max(suspects, key=lambda b: trial.held_out[b.name].ratio + now[b.name].ratio)
     size = f"{now[mismatch.name].systematic:.2g} noise levels"
-    tell(Line(f"after the refit the residual of {mismatch.name} is {size}", _REFITTED))
+    tell(Line(f"after the refit the residual of {mismatch.name} is {size}", _REFIT_SHARE))
     acting = _acting_effects(trial)
     # events of free times would always mend a noise level that was estimated too low
     transient_everywhere = [e for e in acting if not e.at and e.info.transient and not e.info.own]
@@ -558,7 +562,7 @@ class Mismatch:
         The one that keeps most.
     search : Search
         What hypotheses were found with, and are weighed by.
-    candidates : list of Candidate
+    candidates : list of FittedHypothesis
         The baseline first, then every hypothesis.
     weighed : dict of Hypothesis to float
         Their probabilities.
@@ -567,7 +571,7 @@ class Mismatch:
     refit: _Refit
     block: Block
     search: Search
-    candidates: list[Candidate]
+    candidates: list[FittedHypothesis]
     weighed: dict[Hypothesis, float]
 
     @property
@@ -595,7 +599,7 @@ class Mismatch:
         )
         named = [c for c in self.candidates if c.effects and c.fit.events is None]
         best = max(named, key=lambda c: _probability(self.weighed, c), default=None)
-        fitted: list[Candidate] = []
+        fitted: list[FittedHypothesis] = []
         for one in starts:
             alone = trial.fit_effects([one], start.fit, trial.white)
             if alone is None or not _is_visible(alone, one):
@@ -646,14 +650,14 @@ class OnlyNoise:
         The baseline.
     tell : callable
         Receives progress.
-    shared : list of Candidate
+    shared : list of FittedHypothesis
         Effects that other blocks have, with the values that they have there.
     """
 
     refit: _Refit
     group: BlockGroup
     tell: Say
-    shared: list[Candidate] = field(default_factory=list)
+    shared: list[FittedHypothesis] = field(default_factory=list)
 
     def with_effects_of_others(self, starts: list[Start]) -> OnlyNoise:
         """Group after the effects that other blocks name were tried here: one is there where
@@ -708,17 +712,20 @@ def _is_marginal(refit: _Refit) -> bool:
     )
 
 
-def _best_of_each(candidates: list[Candidate]) -> list[Candidate]:
+def _best_of_each(candidates: list[FittedHypothesis]) -> list[FittedHypothesis]:
     """Candidate of each hypothesis that leaves least."""
-    best: dict[Hypothesis, Candidate] = {}
+    best: dict[Hypothesis, FittedHypothesis] = {}
     for candidate in sorted(candidates, key=log_misfit):
         best.setdefault(candidate.hypothesis, candidate)
     return [c for c in candidates if c is best[c.hypothesis]]
 
 
 def _fit_candidates(
-    search: Search, mistaken: list[Candidate], per_recording: list[Term], transient: list[Term]
-) -> list[Candidate]:
+    search: Search,
+    mistaken: list[FittedHypothesis],
+    per_recording: list[Term],
+    transient: list[Term],
+) -> list[FittedHypothesis]:
     """The baseline, single effects, pairs where no single one explains the mismatch, and values
     that are wrong. ``per_recording`` and ``transient`` are effects with sizes, and with times, of
     their own in each recording.
@@ -738,7 +745,7 @@ def _fit_candidates(
     if any(settles(c, trial, start) for c in (*singles, *mistaken)):
         lasting = sorted((c for c in singles if c.fit.events is None), key=log_misfit)
 
-        def more() -> list[Candidate]:
+        def more() -> list[FittedHypothesis]:
             near = _nearly_as_heavy(lasting, alone)
             return [s for c in near for s in with_freed_values(search, c)]
     else:
@@ -748,15 +755,15 @@ def _fit_candidates(
     return [start, *_best_of_each([*singles, *sets, *mistaken, *considered])]
 
 
-def _fit_events(search: Search, effects: list[Term]) -> list[Candidate]:
+def _fit_events(search: Search, effects: list[Term]) -> list[FittedHypothesis]:
     """Effects with sizes or times of their own in each recording, each by itself."""
     candidates = (search.trial.fit_events(effect, search.start) for effect in effects)
     return [c for c in candidates if c is not None]
 
 
 def _nearly_as_heavy(
-    lasting: list[Candidate], weight: Callable[[Candidate], float]
-) -> list[Candidate]:
+    lasting: list[FittedHypothesis], weight: Callable[[FittedHypothesis], float]
+) -> list[FittedHypothesis]:
     """Best of the lasting effects, and its close runners-up by weight."""
     top = max(map(weight, lasting), default=0.0)
     near = [c for c in lasting[1:] if math.exp(weight(c) - top) > _POLISH_FROM]
@@ -764,18 +771,18 @@ def _nearly_as_heavy(
     return [*lasting[:1], *near[: max(MOST_PAIRED - 1, 0)]]
 
 
-def _is_visible(candidate: Candidate, start: Start) -> bool:
+def _is_visible(candidate: FittedHypothesis, start: Start) -> bool:
     """True where recordings depend on any parameter of an effect that was fitted."""
     return any(math.isfinite(candidate.fit.std[name]) for name in start.free)
 
 
 def _weigh_to_the_end(
-    search: Search, candidates: list[Candidate]
-) -> tuple[list[Candidate], dict[Hypothesis, float]]:
+    search: Search, candidates: list[FittedHypothesis]
+) -> tuple[list[FittedHypothesis], dict[Hypothesis, float]]:
     """Hypotheses with their probabilities, those that are close fitted to the end first."""
     start, trial, settings = candidates[0], search.trial, search.trial.settings
 
-    def weights(sets: list[Candidate]) -> dict[Hypothesis, float]:
+    def weights(sets: list[FittedHypothesis]) -> dict[Hypothesis, float]:
         return weigh(sets, trial.compared, search.weighing)
 
     probabilities = weights(candidates)
@@ -899,12 +906,12 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
     return [replace(parts[0], blocks=[*named[:1], *others]), *parts[1:]]
 
 
-def _probability(weighed: dict[Hypothesis, float], candidate: Candidate) -> float:
+def _probability(weighed: dict[Hypothesis, float], candidate: FittedHypothesis) -> float:
     """Probability of a hypothesis."""
     return weighed.get(candidate.hypothesis, 0.0)
 
 
-def _fit_all_recordings(trial: Attempts, start: Candidate) -> Candidate | None:
+def _fit_all_recordings(trial: Attempts, start: FittedHypothesis) -> FittedHypothesis | None:
     """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings,
     taken together, if there is one.
     """
@@ -920,10 +927,10 @@ def _fit_all_recordings(trial: Attempts, start: Candidate) -> Candidate | None:
     )
     if any(significant(e[b.name]) for b in inner.blocks for e in (fitted, held_out)):
         return None
-    return Candidate((), common, held_out, fitted, 0.0)
+    return FittedHypothesis((), common, held_out, fitted, 0.0)
 
 
-def _fit_singles(search: Search) -> list[Candidate]:
+def _fit_singles(search: Search) -> list[FittedHypothesis]:
     """The effects that the screen finds worth it, fitted; the most telling first."""
     trial, screened, baseline = search.trial, search.screened, search.start.fit
     settings = trial.settings
@@ -935,7 +942,7 @@ def _fit_singles(search: Search) -> list[Candidate]:
         [e for e, scores in ranked.items() if _is_worth_fitting(screened, scores, least)]
     )
     first = ", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8])
-    search.tell(Line(f"screened: {first or 'no effect acts here'}", _SCREENED))
+    search.tell(Line(f"screened: {first or 'no effect acts here'}", _SCREEN_SHARE))
 
     if screened.strong:
         chosen, near, short = _shortlist(search, worth, ranked)
@@ -967,8 +974,8 @@ def _fit_singles(search: Search) -> list[Candidate]:
 
 
 def _fit_effect(
-    trial: Attempts, start: Start, baseline: Fit, short: Candidate | None
-) -> Candidate | None:
+    trial: Attempts, start: Start, baseline: Fit, short: FittedHypothesis | None
+) -> FittedHypothesis | None:
     """Fit an effect from a start with the baseline; where a few steps to the same start had left
     less, from where these had moved the baseline too.
     """
@@ -992,7 +999,7 @@ def _scaled_starts(scores: Iterable[Score]) -> list[Start]:
 
 def _shortlist(
     search: Search, worth: list[list[Term]], ranked: dict[Term, list[Score]]
-) -> tuple[list[Term], dict[Term, list[Start]], dict[tuple[Term, str], Candidate]]:
+) -> tuple[list[Term], dict[Term, list[Start]], dict[tuple[Term, str], FittedHypothesis]]:
     """Effects, of many (each a list of its places), that leave least after a few steps; starts to
     which the best of these steps led, and the candidates there, by effect and form.
 
@@ -1003,7 +1010,7 @@ def _shortlist(
     """
     trial, weight, baseline = search.trial, search.weight, search.start.fit
     settings = trial.settings
-    short: dict[Term, list[Candidate]] = {}
+    short: dict[Term, list[FittedHypothesis]] = {}
 
     def begin(starts: dict[Term, list[Start]]) -> None:
         tasks = [(e, start) for e, of_effect in starts.items() for start in of_effect]
@@ -1037,7 +1044,7 @@ def _shortlist(
     first.sort(key=lambda places: -most(places[0]))
     best: list[Term] = []
     starts: dict[Term, list[Start]] = {}
-    ends: dict[tuple[Term, str], Candidate] = {}
+    ends: dict[tuple[Term, str], FittedHypothesis] = {}
     for rank, places in enumerate(first):
         leads = rank < _EFFECTS_WITH_STARTS
         fitted_places = [e for e in places[: None if leads else 1] if most(e) > -math.inf]
@@ -1063,7 +1070,7 @@ def _by_family(terms: list[Term]) -> list[list[Term]]:
     return list(places.values())
 
 
-def _first_of_equal_forms(fitted: list[Candidate], alike: float) -> Candidate:
+def _first_of_equal_forms(fitted: list[FittedHypothesis], alike: float) -> FittedHypothesis:
     """Fit of an effect that leaves least; of forms that leave as little, the catalogue's first."""
     least = min(log_misfit(c) for c in fitted)
     near = [c for c in fitted if log_misfit(c) <= least + alike]
@@ -1086,22 +1093,22 @@ def _near_starts(scores: list[Score]) -> list[Score]:
     return [*near[:MOST_STARTS], *(s for s in forms if s not in near)]
 
 
-def _add_same_data(search: Search, singles: list[Candidate]) -> list[Candidate]:
+def _add_same_data(search: Search, singles: list[FittedHypothesis]) -> list[FittedHypothesis]:
     """Single effects, and for each that may leave the same data as another effect (a late clock and
     a dead time) that other one.
     """
     trial, start, left_by = search.trial, search.start, search.share_left
     single_of = {c.effects: c for c in singles}
 
-    def wanted(effect: Term, shaped: Candidate) -> bool:
+    def wanted(effect: Term, shaped: FittedHypothesis) -> bool:
         """True where an effect was not fitted, or only in a form that leaves clearly more."""
         fitted = single_of.get((effect,))
         return fits(trial.nominal, effect.id) and (
             fitted is None or left_by(fitted) > left_by(shaped) + FORM_SHARE_ALIKE
         )
 
-    all_shaped: list[Candidate] = []
-    others: list[Candidate | None] = []
+    all_shaped: list[FittedHypothesis] = []
+    others: list[FittedHypothesis | None] = []
     for single in singles:
         (effect,) = single.effects
         same = same_data_in(trial.nominal, effect)
@@ -1120,7 +1127,7 @@ def _add_same_data(search: Search, singles: list[Candidate]) -> list[Candidate]:
     return _best_of_each([*all_shaped, *(c for c in others if c is not None)])
 
 
-def _in_shape(search: Search, single: Candidate, same: SameData) -> Candidate:
+def _in_shape(search: Search, single: FittedHypothesis, same: SameData) -> FittedHypothesis:
     """An effect in the shape in which it is the same data as another one, where it explains as much
     in it.
     """
@@ -1139,8 +1146,8 @@ def _in_shape(search: Search, single: Candidate, same: SameData) -> Candidate:
 
 
 def _as_other(
-    trial: Attempts, start: Candidate, single: Candidate, same: SameData
-) -> Candidate | None:
+    trial: Attempts, start: FittedHypothesis, single: FittedHypothesis, same: SameData
+) -> FittedHypothesis | None:
     """The other effect, as large as this one, where the two leave the same recordings."""
     parameters = EFFECTS[same.effect].form(same.form).parameters
     usual = {f"{same.effect}.{p.name}": p.default for p in parameters}
@@ -1151,8 +1158,8 @@ def _as_other(
 
 
 def _as_twin(
-    trial: Attempts, start: Candidate, single: Candidate, twin: Term, same: SameData
-) -> Candidate | None:
+    trial: Attempts, start: FittedHypothesis, single: FittedHypothesis, twin: Term, same: SameData
+) -> FittedHypothesis | None:
     """The effect that leaves the same recordings as this one, where this one has a size."""
     size = single.fit.values.get(f"{same.effect}.{same.parameter}", 0.0)
     if size <= 0.0:

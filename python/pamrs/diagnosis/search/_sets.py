@@ -13,7 +13,7 @@ import numpy as np
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     Attempts,
-    Candidate,
+    FittedHypothesis,
     Weighing,
     explains,
     log_weight,
@@ -66,7 +66,7 @@ class Search:
         Recordings, model, noise levels.
     screened : Screen
         Signatures of the effects.
-    start : Candidate
+    start : FittedHypothesis
         The refitted baseline.
     weighing : Weighing
         What they are weighed by.
@@ -76,23 +76,23 @@ class Search:
 
     trial: Attempts
     screened: Screen
-    start: Candidate
+    start: FittedHypothesis
     weighing: Weighing
     tell: Say
 
-    def weight(self, candidate: Candidate) -> float:
+    def weight(self, candidate: FittedHypothesis) -> float:
         """Logarithm of what a hypothesis weighs against others."""
         return log_weight(candidate, self.start, self.trial.compared, self.weighing)
 
-    def share_left(self, candidate: Candidate) -> float:
+    def share_left(self, candidate: FittedHypothesis) -> float:
         """Share of the mismatch that a hypothesis leaves."""
         return share_left(candidate, self.start, self.trial.compared)
 
-    def heaviest_first(self, candidates: Iterable[Candidate]) -> list[Candidate]:
+    def heaviest_first(self, candidates: Iterable[FittedHypothesis]) -> list[FittedHypothesis]:
         """Hypotheses in the order of their weight."""
         return sorted(candidates, key=self.weight, reverse=True)
 
-    def rank(self, base: Candidate) -> tuple[Tangent, dict[Term, list[Score]]]:
+    def rank(self, base: FittedHypothesis) -> tuple[Tangent, dict[Term, list[Score]]]:
         """The tangent space of a set, and the starts of each effect by what they would take of what
         the set leaves.
         """
@@ -101,8 +101,11 @@ class Search:
 
 
 def combine(
-    search: Search, singles: list[Candidate], mistaken: list[Candidate], transient: list[Term]
-) -> list[Candidate]:
+    search: Search,
+    singles: list[FittedHypothesis],
+    mistaken: list[FittedHypothesis],
+    transient: list[Term],
+) -> list[FittedHypothesis]:
     """Sets of two hypotheses and more, where no single one settles the mismatch.
 
     The best of the single ones get a partner: another effect, or a value that is wrong. The best of
@@ -113,14 +116,14 @@ def combine(
     ----------
     search : Search
         What they are found with.
-    singles, mistaken : list of Candidate
+    singles, mistaken : list of FittedHypothesis
         Single effects and values that are wrong, fitted by themselves.
     transient : list of Term
         Effects that happen at times of their own.
 
     Returns
     -------
-    list of Candidate
+    list of FittedHypothesis
     """
     roots = search.heaviest_first(c for c in (*singles, *mistaken) if c.fit.events is None)
     growing = _Growing(search, roots)
@@ -133,7 +136,7 @@ def combine(
     return [*sets, *happening, *growing.grow(sets)]
 
 
-def with_freed_values(search: Search, single: Candidate) -> list[Candidate]:
+def with_freed_values(search: Search, single: FittedHypothesis) -> list[FittedHypothesis]:
     """Free the parameters that an effect moves far, one at a time, next to the effect."""
     fitted = []
     for name in far_parameters(search.trial, single.fit):
@@ -176,7 +179,7 @@ class _Growing:
     ----------
     search : Search
         What they are found with.
-    roots : list of Candidate
+    roots : list of FittedHypothesis
         Single effects and values that are wrong, fitted by themselves, those that weigh most first.
     done : set of Hypothesis
         Those that were fitted.
@@ -185,7 +188,7 @@ class _Growing:
     """
 
     search: Search
-    roots: list[Candidate]
+    roots: list[FittedHypothesis]
     done: set[Hypothesis] = field(default_factory=set)
     likely: list[_Partner] = field(default_factory=list)
 
@@ -194,11 +197,11 @@ class _Growing:
         """Recordings, model, noise levels."""
         return self.search.trial
 
-    def grow(self, sets: list[Candidate]) -> list[Candidate]:
+    def grow(self, sets: list[FittedHypothesis]) -> list[FittedHypothesis]:
         """Grow the best set by one term after the other."""
         weight = self.search.weight
         best = max(sets, key=weight, default=None)
-        grown: list[Candidate] = []
+        grown: list[FittedHypothesis] = []
         while best is not None and len(best.terms) < self.trial.settings.most_terms:
             formed = self._in_best_forms(best, [*sets, *grown])
             grown += formed
@@ -211,7 +214,9 @@ class _Growing:
             best = further
         return grown
 
-    def _in_best_forms(self, base: Candidate, others: list[Candidate]) -> list[Candidate]:
+    def _in_best_forms(
+        self, base: FittedHypothesis, others: list[FittedHypothesis]
+    ) -> list[FittedHypothesis]:
         """A set with its effects in their best forms, and its rivals in the forms that it has then:
         which of them leaves least must not depend on whose forms were looked at.
         """
@@ -225,7 +230,7 @@ class _Growing:
             c for c in others if mended & set(c.effects) and c.fit.events is None
         )
 
-        def formed(rival: Candidate) -> Candidate | None:
+        def formed(rival: FittedHypothesis) -> FittedHypothesis | None:
             starts = [
                 trial.start_of((best if e in mended else rival).fit, e) for e in rival.effects
             ]
@@ -234,7 +239,7 @@ class _Growing:
         reformed = two_at_a_time(formed, rivals[: trial.settings.most_polished])
         return [best, *(c for c in reformed if c is not None)]
 
-    def widen(self, base: Candidate) -> list[Candidate]:
+    def widen(self, base: FittedHypothesis) -> list[FittedHypothesis]:
         """A set with each of its likely partners, fitted from where both are."""
         starts = self.trial.starts_of(base)
         partners = []
@@ -244,18 +249,18 @@ class _Growing:
                 self.search.tell(f"trying {Hypothesis((*base.terms, *partner.terms))}")
                 partners.append(partner)
 
-        def fitted(partner: _Partner) -> Candidate | None:
+        def fitted(partner: _Partner) -> FittedHypothesis | None:
             warm = replace(base.fit, values=base.fit.values | partner.values)
             wrong = (*base.wrong, *partner.wrong)
             return self.trial.fit_together([*starts, *partner.starts], warm, wrong)
 
         return [c for c in two_at_a_time(fitted, partners) if c is not None]
 
-    def _was_tried(self, base: Candidate, terms: tuple[Term, ...]) -> bool:
+    def _was_tried(self, base: FittedHypothesis, terms: tuple[Term, ...]) -> bool:
         """True where a set was fitted with some further terms."""
         return Hypothesis((*base.terms, *terms)) in self.done
 
-    def _partners(self, base: Candidate, starts: list[Start]) -> Iterator[_Partner]:
+    def _partners(self, base: FittedHypothesis, starts: list[Start]) -> Iterator[_Partner]:
         """Partners of a set: effects whose signature is in what it leaves, terms that explain much
         alone, and parameters that it moves far.
         """
@@ -275,7 +280,7 @@ class _Growing:
         strained = far_parameters(self.trial, base.fit) if base.effects else []
         yield from (_Partner([], (name,)) for name in strained if name not in base.wrong)
 
-    def _shortlisted(self, base: Candidate, base_starts: list[Start]) -> list[_Partner]:
+    def _shortlisted(self, base: FittedHypothesis, base_starts: list[Start]) -> list[_Partner]:
         """Partners of a set: effects, of all that act, that leave least with it after a few steps.
 
         Signatures are linear in what a strong mismatch is not: they rank the starts of a form.
@@ -294,13 +299,13 @@ class _Growing:
         return list(best.values())[:_MOST_PARTNERS]
 
     def _shortly(
-        self, base: Candidate, base_starts: list[Start], starts: list[Start]
-    ) -> list[tuple[Candidate, Start]]:
+        self, base: FittedHypothesis, base_starts: list[Start], starts: list[Start]
+    ) -> list[tuple[FittedHypothesis, Start]]:
         """A set with an effect more, fitted in a few steps from each of its starts, with the start;
         what weighs most comes first.
         """
 
-        def begin(start: Start) -> Candidate | None:
+        def begin(start: Start) -> FittedHypothesis | None:
             return self.trial.fit_shortly([*base_starts, start], base.fit, base.wrong)
 
         attempts = zip(two_at_a_time(begin, starts), starts, strict=True)
@@ -308,14 +313,14 @@ class _Growing:
         return sorted(fitted, key=lambda one: self.search.weight(one[0]), reverse=True)
 
     def _begun_best(
-        self, base: Candidate, base_starts: list[Start], scores: list[Score]
+        self, base: FittedHypothesis, base_starts: list[Start], scores: list[Score]
     ) -> _Partner:
         """Partner of a set: an effect from the start that leaves least after a few steps."""
         starts = [s.start.scaled(s.size) for s in scores[:MOST_STARTS]]
         short = self._shortly(base, base_starts, starts if len(starts) > 1 else [])
         return _Partner([short[0][1] if short else starts[0]])
 
-    def _signatures(self, base: Candidate) -> list[list[Score]]:
+    def _signatures(self, base: FittedHypothesis) -> list[list[Score]]:
         """The effects that would take most of what a set leaves, each from all its starts."""
         trial = self.trial
         tangent, ranked = self.search.rank(base)
@@ -336,7 +341,7 @@ class _Growing:
             best += [effect for effect in in_block[:1] if effect not in best]
         return [ranked[effect] for effect in best]
 
-    def _telling(self, base: Candidate) -> list[_Partner]:
+    def _telling(self, base: FittedHypothesis) -> list[_Partner]:
         """Partners that take a large share of the mismatch alone.
 
         The signature of a strong effect beside another one is linear in what is not; where both
@@ -369,8 +374,8 @@ def _one_place_each(terms: list[Term]) -> list[Term]:
 
 
 def _event_partners(
-    search: Search, singles: list[Candidate], happening: list[Term]
-) -> list[tuple[Term, Candidate]]:
+    search: Search, singles: list[FittedHypothesis], happening: list[Term]
+) -> list[tuple[Term, FittedHypothesis]]:
     """Effects with times of their own, each with a persistent one that may have acted as well.
 
     That is the persistent effect that weighs most, if it leaves much; and, of those that were
@@ -404,7 +409,7 @@ def _event_partners(
     return pairs
 
 
-def in_best_forms(search: Search, base: Candidate) -> Candidate:
+def in_best_forms(search: Search, base: FittedHypothesis) -> FittedHypothesis:
     """Set with each of its effects in the form that leaves least together with the others.
 
     The form that an effect had alone is the one that did best for everything that was missing.
@@ -413,12 +418,12 @@ def in_best_forms(search: Search, base: Candidate) -> Candidate:
     ----------
     search : Search
         With the signatures from which other forms begin.
-    base : Candidate
+    base : FittedHypothesis
         A set of lasting effects and values that are wrong, fitted.
 
     Returns
     -------
-    Candidate
+    FittedHypothesis
         The set itself where it leaves noise, and where no other form leaves less.
     """
     if len(base.terms) < 2 or base.fit.events is not None:
@@ -439,8 +444,8 @@ def in_best_forms(search: Search, base: Candidate) -> Candidate:
 
 
 def _in_another_form(
-    search: Search, base: Candidate, effect: Term, scores: list[Score]
-) -> Candidate | None:
+    search: Search, base: FittedHypothesis, effect: Term, scores: list[Score]
+) -> FittedHypothesis | None:
     """A set with one effect in another form, where one leaves clearly less."""
     trial = search.trial
     now = trial.start_of(base.fit, effect)
@@ -454,7 +459,7 @@ def _in_another_form(
     search.tell(f"trying other forms of {effect} in {base.hypothesis}")
     rest = [trial.start_of(base.fit, e) for e in base.effects if e != effect]
 
-    def begin(start: Start) -> Candidate | None:
+    def begin(start: Start) -> FittedHypothesis | None:
         # parameters that both forms have go on from where they are
         free = {n: base.fit.values.get(n, value) for n, value in start.free.items()}
         starts = [*rest, replace(start, free=free)]
@@ -470,7 +475,9 @@ def _in_another_form(
     return replace(fitted, gain=base.gain)
 
 
-def _blocks_untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[Block]:
+def _blocks_untouched(
+    candidate: FittedHypothesis, start: FittedHypothesis, trial: Attempts
+) -> list[Block]:
     """Blocks in which a set leaves most of what was too much there, in recordings that were fitted
     or held out.
     """
@@ -486,7 +493,7 @@ def _blocks_untouched(candidate: Candidate, start: Candidate, trial: Attempts) -
     ]
 
 
-def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bool:
+def _predicts_better(further: FittedHypothesis, best: FittedHypothesis, trial: Attempts) -> bool:
     """True where a larger set takes a large share of what a smaller one leaves of held-out
     recordings, and more than the pieces of the recordings differ in it.
     """
@@ -502,7 +509,7 @@ def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bo
     return gained > _FURTHER_ERRORS * error and gained > FURTHER_SHARE * left_before
 
 
-def far_above_noise(trial: Attempts, candidate: Candidate) -> bool:
+def far_above_noise(trial: Attempts, candidate: FittedHypothesis) -> bool:
     """True where so much more than noise is left that linear signatures say little."""
     inside = candidate.fitted
     if any(level.curves is not None for level in trial.noise_level.values()):
@@ -518,19 +525,19 @@ def far_above_noise(trial: Attempts, candidate: Candidate) -> bool:
     )
 
 
-def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
+def settles(candidate: FittedHypothesis, trial: Attempts, start: FittedHypothesis) -> bool:
     """True where a hypothesis leaves only noise, so that no pair is called for."""
     return explains(candidate, start, trial.compared)
 
 
-def cannot_gain(candidate: Candidate, trial: Attempts) -> bool:
+def cannot_gain(candidate: FittedHypothesis, trial: Attempts) -> bool:
     """True where no further one-parameter effect could pay for itself."""
     evidence = trial.settings
     least = evidence.further_price + evidence.parameter_price
     return possible_gain(candidate, trial.compared) < least
 
 
-def log_misfit(candidate: Candidate) -> float:
+def log_misfit(candidate: FittedHypothesis) -> float:
     """Logarithm of what a hypothesis leaves of each block, on fitted and on held-out recordings:
     by it the forms of an effect are compared.
     """

@@ -16,7 +16,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import WALL_TOLERANCES, Attempts, BlockGroup, Candidate, significant
+from pamrs.diagnosis.evidence import (
+    WALL_TOLERANCES,
+    Attempts,
+    BlockGroup,
+    FittedHypothesis,
+    significant,
+)
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -115,7 +121,7 @@ def free_suspects(
     first: Fit,
     say: Callable[[str], None],
     share: float | None = None,
-) -> list[Candidate]:
+) -> list[FittedHypothesis]:
     """The suspected parameters, each freed and fitted, and the pairs of the largest gain predicted
     by the linear model.
 
@@ -196,12 +202,14 @@ def _fit_freed(
     baseline: Fit,
     say: Callable[[str], None],
     share: float | None,
-) -> dict[tuple[str, ...], Candidate | None]:
+) -> dict[tuple[str, ...], FittedHypothesis | None]:
     """Each set of parameters freed: those that leave least after a few steps are fitted to their
     end, the others come as they are.
     """
 
-    def to_the_end(several: list[tuple[str, ...]]) -> dict[tuple[str, ...], Candidate | None]:
+    def to_the_end(
+        several: list[tuple[str, ...]],
+    ) -> dict[tuple[str, ...], FittedHypothesis | None]:
         ended = two_at_a_time(lambda names: trial.fit_freed(names, baseline, share), several)
         return dict(zip(several, ended, strict=True))
 
@@ -220,7 +228,7 @@ def _fit_freed(
 
 
 def _needless(
-    names: tuple[str, ...], short: Mapping[tuple[str, ...], Candidate], trial: Attempts
+    names: tuple[str, ...], short: Mapping[tuple[str, ...], FittedHypothesis], trial: Attempts
 ) -> bool:
     """True where one of several parameters, freed alone, leaves nearly as little."""
     alone = [short[name,].misfit for name in names if (name,) in short] if len(names) > 1 else []
@@ -277,7 +285,7 @@ def _predicted_gain(
     return {loose: was - cost(loose) for loose in suspects}
 
 
-def price_of_wrong(candidate: Candidate, settings: DiagnosisSettings) -> float:
+def price_of_wrong(candidate: FittedHypothesis, settings: DiagnosisSettings) -> float:
     """Logarithm of what wrong values cost where the baseline explains all: a file that is further
     outside its tolerances is rarer, but less and less so.
     """
@@ -285,7 +293,7 @@ def price_of_wrong(candidate: Candidate, settings: DiagnosisSettings) -> float:
     return settings.file_log_odds * len(candidate.wrong) + outside
 
 
-def weigh_only_noise(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> BlockGroup:
+def weigh_only_noise(quiet: BlockGroup, prices: Mapping[FittedHypothesis, float]) -> BlockGroup:
     """A group whose baseline leaves only noise, with further hypotheses and the logarithm of what
     each costs; those that leave more than noise, or predict worse, are left out.
     """
@@ -303,13 +311,13 @@ def weigh_only_noise(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> Bl
     return replace(quiet, candidates=[*quiet.candidates, *scores], probabilities=probabilities)
 
 
-def _plausibility(candidate: Candidate) -> float:
+def _plausibility(candidate: FittedHypothesis) -> float:
     """Logarithm of how probable a hypothesis makes the recordings, and its own values."""
     evidence = sum(likelihood.most for likelihood in candidate.likelihood().values())
     return evidence - 0.5 * (candidate.fit.strain + candidate.fit.start_strain)
 
 
-def _carries_over(candidate: Candidate, start: Candidate) -> bool:
+def _carries_over(candidate: FittedHypothesis, start: FittedHypothesis) -> bool:
     """True where held-out recordings are predicted as well as by the baseline, or to noise."""
     pairs = [(candidate.held_out[name], was) for name, was in start.held_out.items()]
     return all(now.ratio <= max(now.limit, was.ratio) for now, was in pairs)
