@@ -98,7 +98,7 @@ def products_of(
     starts: Sequence[Start],
     baseline: Sequence[str],
     noise_level: Mapping[Key, NoiseLevel],
-    left: Mapping[str, float] | None = None,
+    unexplained: Mapping[str, float] | None = None,
 ) -> Products:
     """Products of what some recordings show of effects, baseline parameters and the model's error.
 
@@ -114,7 +114,7 @@ def products_of(
         Parameters that may move inside their tolerances.
     noise_level : dict
         By block and recording, with the curves of the model's error.
-    left : dict of str to float, optional
+    unexplained : dict of str to float, optional
         What a diagnosis leaves unexplained by block [noise levels]; more than one counts as noise.
 
     Raises
@@ -139,7 +139,7 @@ def products_of(
             )
             means, counts = binned(free * tolerances, base_residual.rows, bins_of(prepared))
             curves = np.empty((means.shape[0], 0)) if level.curves is None else level.curves
-            noise = level.noise * max(1.0, (left or {}).get(block.name, 1.0))
+            noise = level.noise * max(1.0, (unexplained or {}).get(block.name, 1.0))
             share = counted(prepared, block, problem.settings) / max(1, int((counts > 0).sum()))
             weights[place] = math.sqrt(share) / noise if noise > 0.0 else 0.0
             columns[place] = [curves, means, np.zeros((means.shape[0], len(starts)))]
@@ -333,13 +333,13 @@ def limits_of(
     rig: Rig,
     baseline: Sequence[str],
     noise_level: Mapping[Key, NoiseLevel],
-    left: Mapping[str, float],
+    unexplained: Mapping[str, float],
 ) -> list[Limit]:
     """Limits of every effect that a rig can have, by recordings that are there.
 
     Parameters
     ----------
-    problem, rig, baseline, noise_level, left
+    problem, rig, baseline, noise_level, unexplained
         As of :func:`products_of`.
 
     Raises
@@ -348,6 +348,6 @@ def limits_of(
         If the model leaves the range in which it holds.
     """
     starts = possible_starts(rig, problem.blocks)
-    products = products_of(problem, rig, starts, baseline, noise_level, left)
+    products = products_of(problem, rig, starts, baseline, noise_level, unexplained)
     limits = Limits(products, starts, baseline, problem.settings).each.values()
     return [limit for limit in limits if limit.block]

@@ -131,9 +131,9 @@ def curves(
         return binned(values, base.rows, width)[0]
 
     columns: list[Array] = []
-    own = _size(stated, block.channel, ranges)
-    if own > 0.0:
-        columns += [means(base.freed(own * curve)) for curve in over(block.channel)]
+    reading_error = _size(stated, block.channel, ranges)
+    if reading_error > 0.0:
+        columns += [means(base.freed(reading_error * curve)) for curve in over(block.channel)]
     for place, share in _flow_errors(block, ranges, stated):
         moved = _flowing(share * np.column_stack(over(place)), base)
         columns += [means(base.freed(column)) for column in moved.T]
@@ -217,9 +217,9 @@ def _flowing(shares: Array, base: Residual) -> Array:
             continue
         # over rows that are not used it fades as beside them
         level = np.interp(np.arange(b - a), used, np.log(np.abs(q[used, 0])))
-        kept = np.minimum(np.exp(np.diff(level)), 1.0)
+        remembered = np.minimum(np.exp(np.diff(level)), 1.0)
         for i in range(a, b - 1):
-            moved[i + 1] = kept[i - a] * moved[i] + steps[i]
+            moved[i + 1] = remembered[i - a] * moved[i] + steps[i]
     return moved
 
 
@@ -249,8 +249,8 @@ def whitening(curves: Array) -> Callable[[Array], Array]:
         Takes residuals (n,) or sensitivities (n, k).
     """
     power, turn = np.linalg.eigh(curves.T @ curves)
-    kept = power > max(float(power.max(initial=0.0)), 1.0) * power.size * np.finfo(float).eps
-    power, turn = power[kept], turn[:, kept]
+    telling = power > max(float(power.max(initial=0.0)), 1.0) * power.size * np.finfo(float).eps
+    power, turn = power[telling], turn[:, telling]
     axes = curves @ (turn / np.sqrt(power))
     damped = axes * (1.0 - 1.0 / np.sqrt(1.0 + power))
     return lambda rows: np.asarray(rows - damped @ (axes.T @ rows), dtype=np.float64)

@@ -149,8 +149,8 @@ def implausible(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> 
         *_motion(recording, rig, settings),
         *_valves(recording, rig),
         *(
-            f"{told}: a command that was not logged; map the right column, or leave this one out"
-            for told in _dead_commands(recording, rig).values()
+            f"{finding}: a command that was not logged; map the right column, or leave this one out"
+            for finding in _dead_commands(recording, rig).values()
         ),
     ]
 

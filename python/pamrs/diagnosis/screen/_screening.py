@@ -312,10 +312,10 @@ class _SignatureSearch:
 
     def add_signature(self, start: Start, looks: int | None = None) -> float:
         """Add the signature of a start; return its gain in chi-square (minus infinity: none)."""
-        there = self.everywhere.get(_values(start)) if start.effect.at else None
-        tried, best = start if there is None else there.moved(start.effect), None
+        everywhere = self.everywhere.get(_values(start)) if start.effect.at else None
+        start_tried, best = start if everywhere is None else everywhere.moved(start.effect), None
         for _ in range(_MOST_SIGNATURES if looks is None else looks):
-            shown = self._signature_of(tried)
+            shown = self._signature_of(start_tried)
             if shown is None:
                 break
             best = shown
@@ -329,11 +329,11 @@ class _SignatureSearch:
                 break
             # what a stop or a threshold does is not in proportion to its size: it is looked at
             # where it would be
-            wanted = tried.scaled(abs(score.size))
-            if wanted == tried:
+            wanted = start_tried.scaled(abs(score.size))
+            if wanted == start_tried:
                 break  # its bounds hold it
-            tried = wanted
-        if self.strong and start.scalable and looks is None and there is None:
+            start_tried = wanted
+        if self.strong and start.scalable and looks is None and everywhere is None:
             others = [self._signature_of(start.scaled(size)) for size in STRONG_SIZES]
             # what a signature says of other sizes than its own is not relied on
             known = [shown for shown in (best, *others) if shown is not None]
@@ -348,12 +348,12 @@ class _SignatureSearch:
     def _signature_of(self, start: Start) -> tuple[Signature, Score | None] | None:
         """The signature of a start and its score; None where the model cannot be run so."""
         what = f"the signature of {start.effect}"
-        left = self.problem.losses.part(what, lambda: self._changes(start))
-        if left is None:
+        block_residuals = self.problem.losses.part(what, lambda: self._changes(start))
+        if block_residuals is None:
             return None
         if not start.effect.at:
-            self.residuals_of[_values(start)] = left
-        rows, _ = stacked(self.problem, left, self.inflation)
+            self.residuals_of[_values(start)] = block_residuals
+        rows, _ = stacked(self.problem, block_residuals, self.inflation)
         entry = (start.effect, start, rows - self.tangent.rows)
         return entry, next(iter(Screen(self.tangent, [entry]).scores()), None)
 
@@ -445,16 +445,16 @@ def _scan_resonance(
     broad = {f"{start.effect}.{p.name}": p.tried for p in parameters if p.tried is not None}
     before = len(signatures)
     name = f"{start.effect}.{scanned.name}"
-    tried = [
+    starts = [
         replace(start, free=start.free | {name: float(x)} | broad)
         for x in np.geomspace(*scanned.scan)
     ]
-    gains = [add_signature(one) for one in tried]
+    gains = [add_signature(one) for one in starts]
     del signatures[before:]
-    order = sorted(range(len(tried)), key=lambda k: -gains[k])
+    order = sorted(range(len(starts)), key=lambda k: -gains[k])
     # the best and the best that is no neighbour of it
     far = [k for k in order[1:] if abs(k - order[0]) > 1]
-    return [tried[k] for k in (order[0], *far[:1])]
+    return [starts[k] for k in (order[0], *far[:1])]
 
 
 def _as_usual(start: Start, first: Start) -> Start:
@@ -531,18 +531,18 @@ def _find_thresholds(
         )
 
     levels = [low + (k + 0.5) * step for k in range(_THRESHOLD_LEVELS)]
-    tried = [
+    pairs = [
         (add_signature(s), a, b, s)
         for a in levels
         for b in (*levels, high + step)
         if b > a
         for s in [at(a, b)]
     ]
-    best = max(tried, key=lambda t: t[0])
+    best = max(pairs, key=lambda t: t[0])
     while step > _THRESHOLD_PRECISION * (high - low):
         step *= 0.5
         _, a, b, _ = best
         around = [(a - step, b), (a + step, b), (a, b - step), (a, b + step)]
-        tried = [(add_signature(s), c, d, s) for c, d in around if 0.0 < c < d for s in [at(c, d)]]
-        best = max([best, *tried], key=lambda t: t[0])
+        pairs = [(add_signature(s), c, d, s) for c, d in around if 0.0 < c < d for s in [at(c, d)]]
+        best = max([best, *pairs], key=lambda t: t[0])
     return best[3]

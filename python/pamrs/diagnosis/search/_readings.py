@@ -365,12 +365,12 @@ def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:
         if len(kinds) > 1:
             continue
         unit = kinds.pop()
-        said = " and ".join(dict.fromkeys(units_said[name] for name in channels))
+        log_units = " and ".join(dict.fromkeys(units_said[name] for name in channels))
         sizes = [_size(units_said[name]) for name in channels]
         for other in OTHERS.get(unit, ()):
             factors = tuple(_size(other) / size for size in sizes)
             if max(abs(math.log(factor)) for factor in factors) > 1e-6:
-                yield Reading(channels, said, other, factors)
+                yield Reading(channels, log_units, other, factors)
         if unit == "Pa":
             same = (1.0,) * len(channels)
             yield Reading(channels, "gauge", "absolute", same, -ambient)
