@@ -40,7 +40,6 @@ from pamrs.diagnosis.prepare import (
     Prepared,
     Unjudged,
     averaged_to_need,
-    begun_alike,
     blocks_with_tanks,
     check_sense,
     notes_on_beginnings,
@@ -52,6 +51,7 @@ from pamrs.diagnosis.prepare import (
     unjudged_blocks,
     with_own_values,
     with_tanks,
+    with_unjudged_starts,
 )
 from pamrs.diagnosis.ready import Ready, left_out, readied
 from pamrs.diagnosis.result import Diagnosis
@@ -600,7 +600,7 @@ def _problems(
     ]
     known = {n: p.tol for n, p in rig.parameters.items() if 0.0 < p.tol < math.inf}
     fitted, held_out = (
-        [begun_alike(blocks, core, p, known) for p in part] for part in (fitted, held_out)
+        [with_unjudged_starts(blocks, core, p, known) for p in part] for part in (fitted, held_out)
     )
     thin = {
         b.name: share

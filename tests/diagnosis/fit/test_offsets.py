@@ -12,7 +12,7 @@ import pytest
 import pamrs
 from pamrs.diagnosis.fit import Problem, with_offsets
 from pamrs.diagnosis.fit._offsets import _misfits, _moved_alike, _with_later_commands
-from pamrs.diagnosis.prepare import averaged, begun_alike
+from pamrs.diagnosis.prepare import averaged, with_unjudged_starts
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from tests.diagnosis.asked import diagnosed, problem_of
@@ -24,7 +24,7 @@ RIG = parse_rig(WARM)
 
 def problem(recordings: Sequence[Recording]) -> Problem:
     all_of = problem_of(RIG, recordings)
-    ready = [begun_alike(all_of.blocks, all_of.core, p) for p in all_of.recordings]
+    ready = [with_unjudged_starts(all_of.blocks, all_of.core, p) for p in all_of.recordings]
     return replace(all_of, recordings=ready)
 
 

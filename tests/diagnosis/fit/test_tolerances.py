@@ -23,7 +23,7 @@ from pamrs.diagnosis.fit._known_parameters import (
     moved_value,
 )
 from pamrs.diagnosis.noise import noise_levels
-from pamrs.diagnosis.prepare import Prepared, begun_alike, predicted, residual
+from pamrs.diagnosis.prepare import Prepared, predicted, residual, with_unjudged_starts
 from pamrs.rig import Parameter
 from pamrs.simulation import core_rig
 from tests.diagnosis.asked import SETTINGS, problem_of
@@ -112,7 +112,7 @@ def test_a_joint_on_its_stop_begins_at_rest_whatever_its_first_samples_say() -> 
     def begun(prepared: Prepared) -> tuple[bool, float]:
         block = problem.blocks[0]
         residual(block, problem.core, prepared, [])  # keeps the starts that it finds
-        found = begun_alike([block], problem.core, prepared, tolerances)
+        found = with_unjudged_starts([block], problem.core, prepared, tolerances)
         starts = found.starts(block.window, block.drives)
         return bool(found.at_rest), float(found.with_starts("joint_angle", starts)[1][0])
 

@@ -14,7 +14,7 @@ import pytest
 import pamrs
 from pamrs.diagnosis.fit import Events, Problem, residuals
 from pamrs.diagnosis.model import _free_run
-from pamrs.diagnosis.prepare import averaged, begun_alike
+from pamrs.diagnosis.prepare import averaged, with_unjudged_starts
 from pamrs.effects import Term
 from pamrs.errors import SimulationError
 from pamrs.findings import FreeRun
@@ -90,7 +90,9 @@ def test_a_gas_with_a_temperature_is_judged_as_others(
     for leak in (0.0, 3e-8):
         true = rig.with_effect("leak_muscle", {"conductance": leak}) if leak else rig
         problem = problem_of(rig, [vented(true, "held_out", seed, skipped=skipped)])
-        recordings = [begun_alike(problem.blocks, problem.core, p) for p in problem.recordings]
+        recordings = [
+            with_unjudged_starts(problem.blocks, problem.core, p) for p in problem.recordings
+        ]
         problem = replace(problem, recordings=recordings)
         begun = residuals(problem, rig)["chamber", f"r{seed}"].temperature
         assert leak or begun == pytest.approx(293.15 + told, abs=1.0)

@@ -13,10 +13,10 @@ from pamrs.diagnosis.prepare import (
     Block,
     Prepared,
     available_blocks,
-    begun_alike,
     predicted,
     prepare,
     residual,
+    with_unjudged_starts,
 )
 from pamrs.errors import PamrsError
 from pamrs.experiments import Experiment
@@ -50,7 +50,7 @@ def test_what_shows_the_unknown_beginning_is_not_judged(outlet: float) -> None:
     """
     core = core_rig(RIG)
     block, prepared = made(RIG, FILLING, outlet, 0.0)
-    kept = begun_alike([block], core, prepared)
+    kept = with_unjudged_starts([block], core, prepared)
     before, after = (residual(block, core, p, []) for p in (prepared, kept))
     assert 0.3 < kept.unsettled["muscle_pressure"] * DT < 1.5
     assert not after.rows[: kept.unsettled["muscle_pressure"]].any()
@@ -63,14 +63,14 @@ def test_what_shows_the_unknown_beginning_is_not_judged(outlet: float) -> None:
 def test_a_log_that_begins_at_rest_loses_nothing() -> None:
     command = np.repeat([2e5, 4e5, 3e5], 400)
     block, prepared = made(RIG, command, 2e5, 2e5)
-    kept = begun_alike([block], core_rig(RIG), prepared)
+    kept = with_unjudged_starts([block], core_rig(RIG), prepared)
     assert kept.unsettled.get("muscle_pressure", 0) * DT < 0.3
 
 
 def test_a_supply_with_a_gauge_begins_where_it_was_measured() -> None:
     one = driven(RIG, "lift", "fit", DT, {"supply_command": FILLING}, GAUGES, [3])
     problem = problem_of(RIG, [one])
-    assert begun_alike(problem.blocks, problem.core, problem.recordings[0]).unsettled == {}
+    assert with_unjudged_starts(problem.blocks, problem.core, problem.recordings[0]).unsettled == {}
 
 
 def test_outlets_are_those_of_supplies_and_above_a_vacuum() -> None:

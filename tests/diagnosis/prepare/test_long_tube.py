@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.prepare import begun_alike, prepare, residual
+from pamrs.diagnosis.prepare import prepare, residual, with_unjudged_starts
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig
@@ -86,7 +86,7 @@ def test_what_shows_a_flow_before_the_recording_is_not_judged(rig: Rig, late: fl
     """
     prepared = prepare(opened(rig, "fit", 0, 4e5, late, 3.0), rig, SETTINGS)
     blocks, core = list(blocks_of(rig, CHANNELS).values()), core_rig(rig)
-    kept = begun_alike(blocks, core, prepared)
+    kept = with_unjudged_starts(blocks, core, prepared)
     before, after = (residual(blocks[1], core, p, []) for p in (prepared, kept))
     # a gas that begins warm explains what is left of it by then
     explained = rig is BALANCED and late > 0.2
@@ -113,7 +113,7 @@ def test_a_tube_that_was_at_rest_loses_nothing(
     true = rig.with_parameters(wrong)
     one = driven(true, "r", "fit", 0.002, {}, NOISE, [7, 3], duration=1.0, initial=start)
     own = problem_of(rig, [one])
-    assert begun_alike(own.blocks, own.core, own.recordings[0]).unsettled == {}
+    assert with_unjudged_starts(own.blocks, own.core, own.recordings[0]).unsettled == {}
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 cannot be used), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`, `thermometers_of`,
 `warm_chambers` (signals), `Block`, `Input`, `Residual`, `available_blocks`, `Unjudged`,
 `unjudged_blocks` (blocks that the channels do not tell), `signals_at_starts`, `change`,
-`predicted`, `residual` (blocks and their residuals), `begun_alike`, `notes_on_beginnings`,
+`predicted`, `residual` (blocks and their residuals), `with_unjudged_starts`, `notes_on_beginnings`,
 `notes_on_warm_starts` (beginnings that nobody measured), `blocks_with_tanks`,
 `tanks_without_gauge`, `with_tanks`, `notes_on_tanks` (tanks without a gauge, which are simulated),
 `with_declared_values`, `varying`, `with_own_values`, `notes_on_own_values` (values that are free in
@@ -18,9 +18,9 @@ each recording), `notes_on_slack` (muscles that do not push back).
 from pamrs.diagnosis.prepare._ambient import AMBIENT, AMBIENT_PRESSURE, at_ambient
 from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
 from pamrs.diagnosis.prepare._beginning import (
-    begun_alike,
     notes_on_beginnings,
     notes_on_warm_starts,
+    with_unjudged_starts,
 )
 from pamrs.diagnosis.prepare._blocks import (
     Block,
@@ -83,7 +83,7 @@ __all__ = [
     "averaged",
     "averaged_to_need",
     "signals_at_starts",
-    "begun_alike",
+    "with_unjudged_starts",
     "binned",
     "blocks_with_tanks",
     "change",

@@ -53,7 +53,7 @@ _REST_LIKELIHOOD = 1000.0
 Tolerances = Mapping[str, float]
 
 
-def begun_alike(
+def with_unjudged_starts(
     blocks: Sequence[Block],
     core: _core.Rig,
     prepared: Prepared,
