@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from pamrs import rigs
-from pamrs.effects import CATALOGUE, EFFECTS, EffectForm, text
+from pamrs.effects import CATALOGUE, EFFECTS, Form, text
 from pamrs.errors import ParameterError
 from pamrs.rig import parse_rig
 from tests.effects.test_effects import rig_for
@@ -57,7 +57,7 @@ def test_its_snippet_switches_it_on_with_the_usual_values(effect):
 def two_forms(monkeypatch):
     """The leak with another second form."""
     leak = EFFECTS["leak_muscle"]
-    second = EffectForm("porous", leak.parameters[:1], (), ("leak",))
+    second = Form("porous", leak.parameters[:1], (), ("leak",))
     grown = dataclasses.replace(leak, forms=(leak.forms[0], second))
     monkeypatch.setitem(CATALOGUE, "leak_muscle", grown)
     return grown

@@ -15,7 +15,7 @@ import pamrs
 from pamrs import _core
 from pamrs.control.linear import linearise
 from pamrs.diagnosis.fit import same_data_in, starts_of
-from pamrs.effects import CATALOGUE, EFFECTS, EffectForm, EffectInfo, Term
+from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, Form, Term
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
 from pamrs.rig.schema import ACTS
@@ -89,7 +89,7 @@ FORMS = [(effect, form) for effect in sorted(EFFECTS) for form in EFFECTS[effect
 @pytest.mark.parametrize(
     ("effect", "form"), FORMS, ids=[f"{effect}-{form.name}" for effect, form in FORMS]
 )
-def test_a_form_survives_its_file_and_off_it_changes_nothing(effect: str, form: EffectForm) -> None:
+def test_a_form_survives_its_file_and_off_it_changes_nothing(effect: str, form: Form) -> None:
     plain, first = rig_for(effect), form.parameters[0]
     known = {first.name: 0.1 * first.upper}
     rig = plain.with_effect(effect, {first.name: first.upper}, std=known, form=form.name)

@@ -16,14 +16,7 @@ from pamrs.effects._catalogue import (
     WORDS,
     ports_of,
 )
-from pamrs.effects._info import (
-    ClosureTerm,
-    EffectForm,
-    EffectInfo,
-    EffectParameter,
-    SameData,
-    Words,
-)
+from pamrs.effects._info import ClosureTerm, EffectInfo, EffectParameter, Form, SameData, Words
 from pamrs.effects.hypotheses import (
     NONE,
     PARAMETERS,
@@ -52,7 +45,7 @@ __all__ = [
     "ClosureTerm",
     "EffectInfo",
     "EffectParameter",
-    "EffectForm",
+    "Form",
     "Hypothesis",
     "SameData",
     "Term",

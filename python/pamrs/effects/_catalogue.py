@@ -12,9 +12,9 @@ from pamrs import _core
 from pamrs.effects._info import (
     BenchUnit,
     ClosureTerm,
-    EffectForm,
     EffectInfo,
     EffectParameter,
+    Form,
     SameData,
     Words,
 )
@@ -33,8 +33,8 @@ def _parameter(told: dict[str, Any], meanings: dict[str, str]) -> EffectParamete
     return EffectParameter(**own, meaning=meanings[told["name"]])
 
 
-def _form(told: dict[str, Any], meanings: dict[str, str], equation: str) -> EffectForm:
-    return EffectForm(
+def _form(told: dict[str, Any], meanings: dict[str, str], equation: str) -> Form:
+    return Form(
         name=told["name"],
         parameters=tuple(_parameter(parameter, meanings) for parameter in told["parameters"]),
         states=tuple(state["name"] for state in told["states"]),

@@ -174,7 +174,7 @@ class Words:
 
 
 @dataclass(frozen=True, slots=True)
-class EffectForm:
+class Form:
     """One form of an effect.
 
     Attributes
@@ -262,7 +262,7 @@ class EffectInfo:
     equation, fingerprint, separates : str
         Governing equation of the first form; what it looks like in recordings; what it is confused
         with and what separates them.
-    forms : tuple of EffectForm
+    forms : tuple of Form
         Its forms; the first one is meant where none is named.
     reference : str
         Where it comes from.
@@ -328,7 +328,7 @@ class EffectInfo:
     equation: str
     fingerprint: str
     separates: str
-    forms: tuple[EffectForm, ...]
+    forms: tuple[Form, ...]
     reference: str
     rivals: tuple[str, ...] = ()
     catalogue: bool = True
@@ -357,7 +357,7 @@ class EffectInfo:
         """The parameters of the first form."""
         return self.forms[0].parameters
 
-    def form(self, name: str = "") -> EffectForm:
+    def form(self, name: str = "") -> Form:
         """Form of the effect by its name.
 
         Parameters
@@ -367,7 +367,7 @@ class EffectInfo:
 
         Returns
         -------
-        EffectForm
+        Form
 
         Raises
         ------
@@ -406,11 +406,11 @@ class EffectInfo:
 
     @property
     def transient(self) -> bool:
-        """True where the first form is transient; see :attr:`EffectForm.transient`."""
+        """True where the first form is transient; see :attr:`Form.transient`."""
         return self.forms[0].transient
 
     @property
-    def lasting(self) -> tuple[EffectForm, ...]:
+    def lasting(self) -> tuple[Form, ...]:
         """Forms that act all the time, with the same parameters in all recordings."""
         return tuple(form for form in self.forms if not form.transient)
 

@@ -9,7 +9,7 @@ import textwrap
 from typing import Final
 
 from pamrs._checks import refused
-from pamrs.effects import CATALOGUE, EffectForm, EffectInfo, EffectParameter
+from pamrs.effects import CATALOGUE, EffectInfo, EffectParameter, Form
 from pamrs.errors import ParameterError
 from pamrs.units import with_unit
 
@@ -131,7 +131,7 @@ def snippet(effect: str, *, form: str = "", at: str = "") -> str:
     return "\n".join(lines)
 
 
-def _form(info: EffectInfo, name: str) -> EffectForm:
+def _form(info: EffectInfo, name: str) -> Form:
     """One form of an effect, the first without a name."""
     try:
         return info.form(name)
@@ -190,7 +190,7 @@ def description(effect: str) -> str:
     return "\n".join(lines)
 
 
-def _parameters(info: EffectInfo, form: EffectForm) -> list[str]:
+def _parameters(info: EffectInfo, form: Form) -> list[str]:
     """A table of the parameters of a form."""
     rows = [
         (p.name, with_unit(f"{p.default:g}", p.unit), range_of(p), p.meaning)

@@ -13,7 +13,7 @@ from pamrs.declared import Rule, holds, is_finite, is_text, problems_of
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.fit._data import ForceMap
 from pamrs.fit._files import Columns, read_map
-from pamrs.rig import Muscle, TableReader, muscle_problems
+from pamrs.rig import Muscle, Reader, muscle_problems
 from pamrs.rig.muscle_models import models_with
 
 
@@ -225,7 +225,7 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
         With every problem found in it.
     """
     document = toml_document(file, RecordingError)
-    reader = TableReader()
+    reader = Reader()
     reader.problems += problems_of("", document, _TOP, needed=("schema",))
     if "file" not in document:
         reader.problems.append("file is missing: the table with the measurements")
@@ -281,9 +281,7 @@ def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:
     return {**zeros, **block}
 
 
-def _quantity(
-    reader: TableReader, document: Mapping[str, Any], key: str, unit: str
-) -> float | None:
+def _quantity(reader: Reader, document: Mapping[str, Any], key: str, unit: str) -> float | None:
     """``{ value, unit }`` in SI, None where there is none or after noting what is wrong with it."""
     raw = document.get(key)
     if raw is None:

@@ -3,15 +3,15 @@
 :class:`Rig` is what everything else works with; :func:`load_rig` reads one from a TOML file.
 :class:`Muscle` and :class:`Joint` also stand alone. :mod:`pamrs.rig.schema` lists the blocks and
 keys that a rig file may have, :mod:`pamrs.rig.muscle_models` lists the force models.
-:class:`TableReader` and :func:`muscle_problems` read and check the blocks of other files as those
-of a rig.
+:class:`Reader` and :func:`muscle_problems` read and check the blocks of other files as those of a
+rig.
 """
 
 from pamrs.rig._checks import muscle_problems
 from pamrs.rig._choices import OtherChoice, other_choices
 from pamrs.rig._joint import Joint
 from pamrs.rig._muscle import Muscle, force_table
-from pamrs.rig._reader import TableReader
+from pamrs.rig._reader import Reader
 from pamrs.rig._rig import (
     Parameter,
     Rig,
@@ -28,7 +28,7 @@ __all__ = [
     "Muscle",
     "OtherChoice",
     "Parameter",
-    "TableReader",
+    "Reader",
     "Rig",
     "Units",
     "check_sample_time",

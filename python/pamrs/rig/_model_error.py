@@ -16,7 +16,7 @@ from pamrs.channels import UNITS, channel_of
 from pamrs.rig.schema import qualified, tables_of
 
 if TYPE_CHECKING:
-    from pamrs.rig._reader import TableReader
+    from pamrs.rig._reader import Reader
 
 #: Kinds of block whose error can be stated, as a share.
 ERROR_BLOCKS: Final = (
@@ -34,12 +34,12 @@ ERROR_CHANNELS: Final = {
 _TEXT: Final = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*")
 
 
-def read_model_error(reader: TableReader, raw: Any, model: Mapping[str, Any]) -> dict[str, Any]:
+def read_model_error(reader: Reader, raw: Any, model: Mapping[str, Any]) -> dict[str, Any]:
     """The table ``[model_error]`` in SI.
 
     Parameters
     ----------
-    reader : TableReader
+    reader : Reader
         Notes what is wrong.
     raw : object
         The table as TOML has it, None where there is none.
@@ -84,7 +84,7 @@ def _flat(raw: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
             yield name, entry
 
 
-def _value(reader: TableReader, name: str, entry: Any) -> dict[str, float] | None:
+def _value(reader: Reader, name: str, entry: Any) -> dict[str, float] | None:
     """A share or a size, written as ``"1 %"`` or as ``{ value = 1, unit = "%" }``."""
     label, kind = f"model_error.{name}", channel_of(name)
     si_unit = UNITS[kind] if kind in ERROR_CHANNELS else ""

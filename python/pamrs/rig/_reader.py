@@ -81,7 +81,7 @@ def read_model(text: str, source: str) -> Content:
         document = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise RigError(f"{source}: not valid TOML: {error}") from error
-    reader = TableReader()
+    reader = Reader()
     content = reader.document(document)
     if reader.problems:
         raise RigError(joined(source, reader.problems))
@@ -92,7 +92,7 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else as_said(value)
 
 
-class TableReader:
+class Reader:
     """Turns tables into SI numbers, and notes every problem instead of stopping at the first."""
 
     def __init__(self) -> None:

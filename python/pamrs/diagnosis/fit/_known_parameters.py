@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pamrs.diagnosis.fit._starts import CHOSEN
-from pamrs.effects import CATALOGUE, EFFECTS, EffectForm, effect_of, find_parameter
+from pamrs.effects import CATALOGUE, EFFECTS, Form, effect_of, find_parameter
 from pamrs.rig import Parameter, Rig, named_entries
 
 # least tolerance of a held effect: its deviation came of a lacking model (decision 34)
@@ -22,7 +22,7 @@ _FIXED = (*CHOSEN, "threshold")
 """Roles of parameters that stay as the model has them: no fit has a slope in them."""
 
 
-def _form(entry: Mapping[str, Any]) -> EffectForm:
+def _form(entry: Mapping[str, Any]) -> Form:
     return EFFECTS[entry["id"]].form(entry.get("form", ""))
 
 

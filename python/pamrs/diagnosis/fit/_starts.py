@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pamrs.effects import EffectForm, Term
+from pamrs.effects import Form, Term
 from pamrs.rig import Rig
 
 CHOSEN = ("choice", "side")
@@ -145,7 +145,7 @@ def starts_of(effect: Term, *, sealed: bool) -> list[Start]:
     return [start for form in forms for start in _starts_of_form(effect, form, sealed=sealed)]
 
 
-def _starts_of_form(effect: Term, form: EffectForm, *, sealed: bool) -> list[Start]:
+def _starts_of_form(effect: Term, form: Form, *, sealed: bool) -> list[Start]:
     """Every start of one form."""
     shapes: list[list[tuple[str, float]]] = []
     sizes: dict[str, float] = {}
