@@ -24,7 +24,7 @@ from unittest.mock import patch
 
 from pamrs._losses import Losses
 from pamrs.diagnosis import diagnose
-from pamrs.diagnosis.evidence import BlockGroup, Candidate, Weighing
+from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, Weighing
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.search import Mismatch
 from pamrs.errors import PamrsError
@@ -46,12 +46,12 @@ class Weighed:
         Prices.
     """
 
-    candidates: list[Candidate]
+    candidates: list[FittedHypothesis]
     suspects: list[Block]
     weighing: Weighing
 
 
-def _light(candidate: Candidate) -> Candidate:
+def _light(candidate: FittedHypothesis) -> FittedHypothesis:
     """A hypothesis without residuals, its likelihood worked out."""
     known = dict(candidate.likelihood())
     fit = replace(candidate.fit, residuals={})

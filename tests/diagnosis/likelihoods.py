@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import pamrs
-from pamrs.diagnosis.evidence import BlockLikelihood, Candidate
+from pamrs.diagnosis.evidence import BlockLikelihood, FittedHypothesis
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.fit import Fit
 from pamrs.diagnosis.noise import Excess
@@ -74,7 +74,7 @@ def made_up(
     left: dict[str, Excess],
     values: Mapping[str, float] | None = None,
     **fitted: Any,
-) -> Candidate:
+) -> FittedHypothesis:
     """A hypothesis by its text that leaves so much of each block, fitted and held out; values of
     its fit may be given.
     """
@@ -91,4 +91,4 @@ def made_up(
     given = usual | fitted
     before = stated(known, given.get("moved", {}), given["scales"])
     fit = Fit(effects, rig, known, cost=0.0, residuals={}, known=before, **given)
-    return Candidate(effects, fit, left, left, 0.0, wrong=wrong, likelihood=leaving(left))
+    return FittedHypothesis(effects, fit, left, left, 0.0, wrong=wrong, likelihood=leaving(left))

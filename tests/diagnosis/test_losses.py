@@ -119,7 +119,7 @@ def test_a_search_for_units_or_offsets_that_fails_costs_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(pamrs.diagnosis, "find_misread", broken)
-    monkeypatch.setattr(pamrs.diagnosis, "_on_time", broken)
+    monkeypatch.setattr(pamrs.diagnosis, "_with_offsets", broken)
     found = pamrs.diagnose(leaking())
     assert found.verdict == "effects"
     assert found.warnings[0].startswith("the search for other units failed and was left out")

@@ -10,7 +10,7 @@ from functools import partial
 import pytest
 
 import pamrs
-from pamrs.diagnosis import _capped, _unsettled
+from pamrs.diagnosis import _capped, _unknown_parameters
 from pamrs.diagnosis.__init__ import _UNKNOWN_GEOMETRY_PROBABILITY
 from pamrs.diagnosis.evidence import BlockGroup
 from pamrs.diagnosis.next_experiment import measurable
@@ -96,8 +96,10 @@ def test_no_confident_name_beside_unknown_geometry(bare: pamrs.Rig) -> None:
     text = bare.to_toml_text()
     line = next(x for x in text.splitlines() if x.startswith("radius"))
     unknown = line.split(", tol")[0].rstrip(" }") + ", unknown = true }"
-    assert _unsettled(bare) == []
-    assert _unsettled(parse_rig(text.replace(line, unknown, 1))) == ["transmission.flexor.radius"]
+    assert _unknown_parameters(bare) == []
+    assert _unknown_parameters(parse_rig(text.replace(line, unknown, 1))) == [
+        "transmission.flexor.radius"
+    ]
     arm = blocks_of(bare, measurable(bare))["arm.elbow"]
     chances = of_texts({"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05})
     group = BlockGroup([arm], {}, {}, [], chances, arm, {}, [arm])

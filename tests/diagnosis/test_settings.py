@@ -51,20 +51,26 @@ def without_reason(text: str) -> list[str]:
 
 def test_every_number_of_a_module_has_its_reason() -> None:
     assert without_reason("_A = 1\n\n_B = 2  # of a cubic\n# of air\n_C = (3, 4)\n") == ["_A"]
-    found = {}
-    for path in sorted(DIAGNOSIS.rglob("*.py")):
-        found[path.relative_to(DIAGNOSIS).as_posix()] = without_reason(path.read_text("utf-8"))
+    found = {
+        path.relative_to(DIAGNOSIS).as_posix(): without_reason(path.read_text("utf-8"))
+        for path in sorted(DIAGNOSIS.rglob("*.py"))
+    }
     assert sum(map(len, found.values())) == 0, {k: v for k, v in found.items() if v}
     assert len(found) > 50
 
 
-def test_a_name_of_a_number_has_one_value() -> None:
-    values: dict[str, set[str]] = {}
-    for path in sorted(DIAGNOSIS.rglob("*.py")):
-        for name, own in numbers(ast.parse(path.read_text("utf-8"))).items():
-            values.setdefault(name, set()).add(ast.unparse(own.value))  # type: ignore[attr-defined]
-    assert len(values) > 200
-    assert not {name: found for name, found in values.items() if len(found) > 1}
+def test_a_name_of_a_constant_has_one_value() -> None:
+    pairs = {
+        (n.id.lstrip("_"), ast.unparse(node.value))
+        for path in [*DIAGNOSIS.rglob("*.py"), *DIAGNOSIS.with_name("findings").rglob("*.py")]
+        for node in ast.parse(path.read_text("utf-8")).body
+        if isinstance(node, (ast.Assign, ast.AnnAssign)) and node.value is not None
+        for n in ast.walk(node)
+        if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store) and n.id.isupper()
+    }
+    names = [name for name, _ in pairs]
+    assert len(names) > 200
+    assert not [pair for pair in pairs if names.count(pair[0]) > 1]
 
 
 def test_no_function_reads_a_default() -> None:

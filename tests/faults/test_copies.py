@@ -14,7 +14,7 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import overlap, without_copies
 from pamrs.recordings import Recording
-from tests.diagnosis.test_overlap import KINDS, SENSORS, SOME_KINDS, of, run
+from tests.diagnosis.prepare.test_overlap import KINDS, SENSORS, SOME_KINDS, of, run
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).parent

@@ -1,4 +1,5 @@
-"""How much there is: statements of each package, and lines of each function.
+"""How much there is: statements of each package, lines of each function, and things that a class
+name stands for.
 
 Statements are counted (nodes of ``ast.stmt``), which no packing of lines makes fewer. A change that
 passes one budget lowers another one in the same commit; the sum grows only where an issue has
@@ -132,3 +133,17 @@ def test_functions_can_be_read_in_one_sitting(folder: str) -> None:
     found = {(path, name): count for path in files(folder) for name, count in lengths(path)}
     assert len(found) > 100
     assert not {key: count for key, count in found.items() if count > MOST_LINES}
+
+
+#: Names of two classes, which are public in their packages or in messages.
+TWICE = {"Clock", "Entry", "Event", "Form", "Part", "Reader"}
+
+
+def test_a_class_name_stands_for_one_thing() -> None:
+    found = Counter(
+        node.name
+        for path in files("python/pamrs")
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.ClassDef)
+    )
+    assert {name for name, count in found.items() if count > 1} == TWICE

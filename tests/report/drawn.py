@@ -34,7 +34,7 @@ from pamrs.findings import (
 )
 from pamrs.report.verdict import verdict
 from tests.diagnosis.asked import SETTINGS
-from tests.diagnosis.test_verdicts import RIG, group
+from tests.diagnosis.evidence.test_verdicts import RIG, group
 
 CHANNELS = {"chamber": ("muscle_pressure", "Pa", 400.0), "arm": ("joint_angle", "rad", 1e-3)}
 """Channel, unit and noise of each block."""

@@ -16,7 +16,7 @@ import pytest
 
 import pamrs
 from pamrs.sweeps._running import Progress
-from pamrs.sweeps._store import Entry, read_journal
+from pamrs.sweeps._store import StoredChunk, read_journal
 from tests.sweeps.helpers import same, small
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="processes as on POSIX")
@@ -49,7 +49,7 @@ def noting(notes, fatal):
     _running.run_chunk = run_chunk
 
 def dying_in_write(fatal):
-    to_disk, line, write, seen = _store._to_disk, _store.Entry.line, _store.Store.write, [0]
+    to_disk, line, write, seen = _store._to_disk, _store.StoredChunk.line, _store.Store.write, [0]
     def written(self, chunk, values, done):
         seen[0] += 1
         entry = write(self, chunk, values, done)
@@ -74,7 +74,7 @@ def dying_in_write(fatal):
             os.write(journal, line(self)[:9])
             die()
         return line(self)
-    _store.Store.write, _store._to_disk, _store.Entry.line = written, flushed, half
+    _store.Store.write, _store._to_disk, _store.StoredChunk.line = written, flushed, half
 
 def dying_in_making(fatal):
     if fatal == [0, "while the store is made"]:
@@ -188,7 +188,7 @@ def test_two_processes_do_not_share_a_store(tmp_path):
 
 
 def test_a_journal_cut_anywhere_has_the_lines_before(tmp_path):
-    entries = [Entry(k, 4, k % 2, (7, "über 3°") if k % 2 else None) for k in range(5)]
+    entries = [StoredChunk(k, 4, k % 2, (7, "über 3°") if k % 2 else None) for k in range(5)]
     whole = b"".join(entry.line() for entry in entries)
     file = tmp_path / "journal"
     for size in range(len(whole) + 1):

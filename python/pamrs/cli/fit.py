@@ -265,7 +265,7 @@ def _friction(
 
 
 def _rubbing(
-    inputs: _Inputs,
+    inputs: _MapInputs,
     choice: FrictionChoice | None,
     model: str | None,
     pressures: Sequence[float] | None,
@@ -330,7 +330,7 @@ def _comparison(
 
 
 @dataclass(frozen=True)
-class _Inputs:
+class _MapInputs:
     """A force map, the muscle it is of, and what is known of both.
 
     The tolerances are standard deviations of the muscle's parameters in SI, the noise is that of
@@ -344,7 +344,7 @@ class _Inputs:
     rig: Rig | None = None
 
 
-def _shape(context: typer.Context, inputs: _Inputs) -> tuple[dict[str, Any], list[str]]:
+def _shape(context: typer.Context, inputs: _MapInputs) -> tuple[dict[str, Any], list[str]]:
     """Arguments that a fit and a comparison share, and notes on what is not used."""
     from pamrs.rig.muscle_models import ELASTIC_PARAMETERS
 
@@ -372,7 +372,7 @@ def _shape(context: typer.Context, inputs: _Inputs) -> tuple[dict[str, Any], lis
     return shape, notes
 
 
-def _inputs(context: typer.Context) -> _Inputs:
+def _inputs(context: typer.Context) -> _MapInputs:
     """Read the inputs of a fit, from a description or from a table and the options."""
     given, data = context.params, context.params["data"]
     if data.suffix.lower() == ".toml":
@@ -386,10 +386,10 @@ def _inputs(context: typer.Context) -> _Inputs:
         from pamrs.fit import load_measured_muscle
 
         measured = load_measured_muscle(data, allow_outside=given["allow_outside"])
-        return _Inputs(measured.data, measured.muscle, measured.tolerance, measured.noise)
+        return _MapInputs(measured.data, measured.muscle, measured.tolerance, measured.noise)
     start, tolerance, base = _start(given)
     map_ = _table(given, float(start.parameters["rest_length"]))
-    return _Inputs(map_.checked_against(start), start, tolerance, rig=base)
+    return _MapInputs(map_.checked_against(start), start, tolerance, rig=base)
 
 
 def _table(given: Mapping[str, Any], rest_length: float) -> ForceMap:

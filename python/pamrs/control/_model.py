@@ -19,7 +19,7 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 
 
-class Parameter(NamedTuple):
+class MotionParameter(NamedTuple):
     """A number of the equation of motion that is linear in it, which a controller may estimate."""
 
     name: str
@@ -65,7 +65,7 @@ class JointModel(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def parameters(self) -> tuple[Parameter, ...]:
+    def parameters(self) -> tuple[MotionParameter, ...]:
         """Parameters in which the torque is linear, in the order of :meth:`regressor`."""
 
     @property
@@ -251,12 +251,12 @@ class ArmModel(JointModel):
         return 1
 
     @property
-    def parameters(self) -> tuple[Parameter, ...]:
+    def parameters(self) -> tuple[MotionParameter, ...]:
         """``I``, ``b`` and ``m g r``."""
         return (
-            Parameter("inertia", 0, self.inertia),
-            Parameter("viscous", 1, self.viscous),
-            Parameter("weight", 2, self.weight),
+            MotionParameter("inertia", 0, self.inertia),
+            MotionParameter("viscous", 1, self.viscous),
+            MotionParameter("weight", 2, self.weight),
         )
 
     def inverse_dynamics(

@@ -23,7 +23,7 @@ import numpy as np
 from pamrs._arrays import Array
 from pamrs._checks import finite, refused
 from pamrs.control._groups import highest_pressure, joints_of
-from pamrs.control._model import JointModel, Parameter
+from pamrs.control._model import JointModel, MotionParameter
 from pamrs.control._protocol import Value
 from pamrs.control._torque import TorqueModel, drive_limits, joint_torque
 from pamrs.control._values import positive_gain
@@ -206,18 +206,21 @@ class PlanarArmModel(JointModel):
         return ()
 
     @property
-    def parameters(self) -> tuple[Parameter, ...]:
+    def parameters(self) -> tuple[MotionParameter, ...]:
         """``A_ii`` and ``A_ij``, ``b_i``, ``B_i g``."""
         names, n = self.names, len(self.names)
         return (
-            *(Parameter(f"inertia_{names[i]}", 0, float(self.coupling[i, i])) for i in range(n)),
             *(
-                Parameter(f"inertia_{names[i]}_{names[j]}", 0, float(self.coupling[i, j]))
+                MotionParameter(f"inertia_{names[i]}", 0, float(self.coupling[i, i]))
+                for i in range(n)
+            ),
+            *(
+                MotionParameter(f"inertia_{names[i]}_{names[j]}", 0, float(self.coupling[i, j]))
                 for i in range(n)
                 for j in range(i + 1, n)
             ),
-            *(Parameter(f"viscous_{names[i]}", 1, float(self.viscous[i])) for i in range(n)),
-            *(Parameter(f"weight_{names[i]}", 2, float(self.weight[i])) for i in range(n)),
+            *(MotionParameter(f"viscous_{names[i]}", 1, float(self.viscous[i])) for i in range(n)),
+            *(MotionParameter(f"weight_{names[i]}", 2, float(self.weight[i])) for i in range(n)),
         )
 
     def over_joints(self, value: Value) -> Value:

@@ -40,18 +40,18 @@ from pamrs.diagnosis.prepare import (
     Prepared,
     Unjudged,
     averaged_to_need,
-    begun_alike,
-    blocks_beside_tanks,
+    blocks_with_tanks,
     check_sense,
+    notes_on_beginnings,
+    notes_on_own_values,
+    notes_on_slack,
+    notes_on_tanks,
     prepare,
-    said_of_beginnings,
-    said_of_own,
-    said_of_slack,
-    said_of_tanks,
+    tanks_without_gauge,
     unjudged_blocks,
-    unread_tanks,
     with_own_values,
     with_tanks,
+    with_unjudged_starts,
 )
 from pamrs.diagnosis.ready import Ready, left_out, readied
 from pamrs.diagnosis.result import Diagnosis
@@ -87,7 +87,7 @@ def _usable_share(block: Block, recordings: list[Prepared]) -> float:
     return float(sum(r.sum() for r in rows)) / sum(r.size for r in rows)
 
 
-def _unsettled(rig: Rig) -> list[str]:
+def _unknown_parameters(rig: Rig) -> list[str]:
     """Parameters of what moves that the rig file marks unknown and that no fit moves."""
     moving = ("muscle", "transmission", "joint", "arm", "link", "load")
     unknown = [name for name, parameter in rig.parameters.items() if not parameter.known]
@@ -98,9 +98,9 @@ def _capped(group: BlockGroup, factor: float) -> BlockGroup:
     """Scale down all names in a group of moving blocks; ``unlisted`` gets the rest."""
     if group.mismatch is None or not group.mismatch.mechanical:
         return group
-    kept = {h: factor * p if h.terms else p for h, p in group.probabilities.items()}
-    kept[UNLISTED] = kept.get(UNLISTED, 0.0) + 1.0 - sum(kept.values())
-    return replace(group, probabilities=kept)
+    probabilities = {h: factor * p if h.terms else p for h, p in group.probabilities.items()}
+    probabilities[UNLISTED] = probabilities.get(UNLISTED, 0.0) + 1.0 - sum(probabilities.values())
+    return replace(group, probabilities=probabilities)
 
 
 @contextmanager
@@ -115,7 +115,7 @@ def _in_range(name: str) -> Iterator[None]:
         ) from error
 
 
-def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
+def _regulators_in_noise(problem: Problem, rig: Rig) -> dict[str, str]:
     """Regulators whose droop cannot be judged, and why, by block: only the difference of two
     measured pressures shows their flow, and that is mostly noise.
 
@@ -126,7 +126,7 @@ def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
     drooping = [name for name in regulators_of(rig) if tables[name]["droop"] > 0.0]
     regulated = [b for b in problem.blocks if b.kind == "supply" and block_of(b.name) in drooping]
     recordings = problem.recordings
-    found = {}
+    reasons = {}
     noise_level = (
         noise_levels(replace(problem, blocks=regulated), problem.core) if regulated else {}
     )
@@ -139,13 +139,13 @@ def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
             sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True))
         )
         if shift > _REGULATOR_DROOP_SHIFT:
-            found[block.name] = (
+            reasons[block.name] = (
                 "only the difference of two measured pressures "
                 f"tells the regulator's flow, and their noise would move its droop by {shift:.2g} "
                 f"standard deviations; at most {_REGULATOR_DROOP_SHIFT:g} is allowed (a flow meter "
                 "would settle it)"
             )
-    return found
+    return reasons
 
 
 def diagnose(
@@ -223,9 +223,9 @@ def diagnose(
     chosen = DiagnosisSettings() if settings is None else settings
     ready = readied(case, chosen)
     case = ready.case
-    asked = _asked(case.rig, consider)
+    considered = _checked_suspicions(case.rig, consider)
     with _in_range(case.name):
-        diagnosis, ready = _answered(ready, chosen, asked, say)
+        diagnosis, ready = _answer_without_unfollowed(ready, chosen, considered, say)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     say(f"{case.name}: done", 1.0)
@@ -237,72 +237,78 @@ def diagnose(
     )
 
 
-def _answered(
-    ready: Ready, settings: DiagnosisSettings, asked: tuple[Hypothesis, ...], say: Steps
+def _answer_without_unfollowed(
+    ready: Ready, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...], say: Steps
 ) -> tuple[Diagnosis, Ready]:
     """Diagnose a case without recordings that its model cannot follow; return that case too."""
     try:
-        return _answer(ready, settings, asked, say), ready
+        return _diagnose_ready(ready, settings, considered, say), ready
     except Unfollowed as error:
-        lost = error
-    why = f"the model cannot follow it ({lost})"
-    case, said = left_out(ready.case, lambda r: why * (r.name == lost.recording))
-    if not said:
-        raise lost
-    there = replace(ready, case=case, suspected=[*said, *ready.suspected])
-    return _answered(there, settings, asked, say)
+        unfollowed = error
+    why = f"the model cannot follow it ({unfollowed})"
+    case, notes = left_out(ready.case, lambda r: why * (r.name == unfollowed.recording))
+    if not notes:
+        raise unfollowed
+    rest = replace(ready, case=case, suspected=[*notes, *ready.suspected])
+    return _answer_without_unfollowed(rest, settings, considered, say)
 
 
-def _answer(
-    ready: Ready, settings: DiagnosisSettings, asked: tuple[Hypothesis, ...], say: Steps
+def _diagnose_ready(
+    ready: Ready, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...], say: Steps
 ) -> Diagnosis:
     """Diagnose a case that passed the checks before any fit."""
     case = ready.case
     shortened, counts = averaged_to_need(case.recordings, ready.blocks, case.name, settings)
     case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings", _JUDGED[0] / 2)
-    inner, outer, unjudged, begun = _problems(case, settings, asked)
+    inner, outer, unjudged, start_notes = _problems(case, settings, considered)
     part, moved = partial(inner.losses.part, through=(PamrsError,)), list[str]()
-    read = part("the search for other units", lambda: find_misread(inner, case.rig))
-    if read is not None:
-        errors = {"fit": reading_errors(case.rig, inner, read), "held_out": {}}
+    misread = part("the search for other units", lambda: find_misread(inner, case.rig))
+    if misread is not None:
+        errors = {"fit": reading_errors(case.rig, inner, misread), "held_out": {}}
         if outer is not inner:
-            errors["held_out"] = reading_errors(case.rig, outer, read)
-        diagnosis = misread_diagnosis(case, inner, read, unjudged, errors)
+            errors["held_out"] = reading_errors(case.rig, outer, misread)
+        diagnosis = misread_diagnosis(case, inner, misread, unjudged, errors)
     else:
-        laid = part("the search for offsets of commands", lambda: _on_time(inner, outer, case.rig))
-        inner, outer, moved = laid or (inner, outer, [])
-        stated, judged, unjudged = _physics(case, inner, outer, unjudged, say)
+        shifted = part(
+            "the search for offsets of commands", lambda: _with_offsets(inner, outer, case.rig)
+        )
+        inner, outer, moved = shifted or (inner, outer, [])
+        stated, judged, unjudged = _diagnose_physics(case, inner, outer, unjudged, say)
         what = "the look at other laws of the rig"
         diagnosis = inner.losses.part(
-            what, lambda: _under_best_law(case, asked, inner, stated), stated
+            what, lambda: _under_best_law(case, considered, inner, stated), stated
         )
         inner = judged
     # the first few are all that a terminal shows: first what may make the answer wrong
     # a unit that is found settles what was doubted under the one that was said
-    doubts = ready.doubts if read is None else []
-    warnings = [*inner.losses.told, *ready.suspected, *doubts, *begun, *ready.told]
+    doubts = ready.doubts if misread is None else []
+    warnings = [*inner.losses.told, *ready.suspected, *doubts, *start_notes, *ready.told]
     warnings += [*diagnosis.warnings, *ready.masked, *moved]
-    own = {p.recording.name: p.recording.parameters for p in (*inner.recordings, *outer.recordings)}
-    found = [replace(r, parameters=own.get(r.name, r.parameters)) for r in case.recordings]
-    data = data_used(found, counts, inner.blocks, case.rig, inner.core, unjudged)
+    values_of = {
+        p.recording.name: p.recording.parameters for p in (*inner.recordings, *outer.recordings)
+    }
+    recordings = [
+        replace(r, parameters=values_of.get(r.name, r.parameters)) for r in case.recordings
+    ]
+    data = data_used(recordings, counts, inner.blocks, case.rig, inner.core, unjudged)
     return replace(diagnosis, warnings=warnings, data=data)
 
 
 def _case_of(case: Any, data: Any, rig: Any, *, allow_outside: bool) -> Case:
     """The case that the caller means, with the model to begin from."""
-    found = _recorded(case, data, allow_outside=allow_outside)
+    recorded = _case_with_own_model(case, data, allow_outside=allow_outside)
     if rig is None:
-        return found
-    return found.with_rig(rig) if isinstance(rig, Rig) else found.with_rig(load_rig(rig), rig)
+        return recorded
+    return recorded.with_rig(rig) if isinstance(rig, Rig) else recorded.with_rig(load_rig(rig), rig)
 
 
-def _recorded(case: Any, data: Any, *, allow_outside: bool) -> Case:
+def _case_with_own_model(case: Any, data: Any, *, allow_outside: bool) -> Case:
     """The case that the caller means, with its own model."""
     if data is not None:
-        own = case if isinstance(case, (Rig, Case)) else load_rig(case)
+        model = case if isinstance(case, (Rig, Case)) else load_rig(case)
         several = isinstance(data, Mapping) and data and all(map(is_table, data.values()))
-        return Case.from_arrays(own, data if several else {"data": data})  # type: ignore[arg-type]
+        return Case.from_arrays(model, data if several else {"data": data})  # type: ignore[arg-type]
     if isinstance(case, Rig):
         raise DiagnosisError(
             "case is a Rig, and data is missing: diagnose(rig, data=table), or a case or its folder"
@@ -310,7 +316,7 @@ def _recorded(case: Any, data: Any, *, allow_outside: bool) -> Case:
     return case if isinstance(case, Case) else load_case(case, allow_outside=allow_outside)
 
 
-def _physics(
+def _diagnose_physics(
     case: Case, inner: Problem, outer: Problem, unjudged: list[Unjudged], say: Steps
 ) -> tuple[Diagnosis, Problem, list[Unjudged]]:
     """Diagnose physics: the result, recordings with judged blocks, and unjudged blocks."""
@@ -321,38 +327,38 @@ def _physics(
     inner, outer = _judged_only(inner, outer, groups)
     missed = [b for group in groups if group.mismatch is not None for b in group.blocks]
     slack = inner.losses.part(
-        "the look at slack muscles", lambda: said_of_slack(case.rig, missed, inner.recordings), []
+        "the look at slack muscles", lambda: notes_on_slack(case.rig, missed, inner.recordings), []
     )
-    unsettled = _unsettled(case.rig) if motion else []
+    unsettled = _unknown_parameters(case.rig) if motion else []
     if unsettled:
         groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
     say("putting the answer together", _JUDGED[1])
-    kept, failed = {block.name for block in inner.blocks}, "its judgement failed"
-    unjudged += [Unjudged(b.name, b.covers, failed) for b in every if b.name not in kept]
-    found = conclude(case.rig, inner, outer, groups)
-    diagnosis = assemble(case, inner, outer, groups, found, unjudged)
+    judged_names, failed = {block.name for block in inner.blocks}, "its judgement failed"
+    unjudged += [Unjudged(b.name, b.covers, failed) for b in every if b.name not in judged_names]
+    conclusion = conclude(case.rig, inner, outer, groups)
+    diagnosis = assemble(case, inner, outer, groups, conclusion, unjudged)
     proposal = inner.losses.part(
         "the next experiment",
         lambda: next_to_record(
             diagnosis,
-            found.ambiguity,
-            found.hypotheses(inner),
+            conclusion.ambiguity,
+            conclusion.hypotheses(inner),
             case.rig,
-            found.judged,
+            conclusion.judged,
             inner,
             outer,
         ),
         NextExperiment(""),
     )
     missing = inner.losses.part(
-        "the missing input", lambda: _missing(diagnosis.answer, found, inner, outer)
+        "the missing input", lambda: _missing(diagnosis.answer, conclusion, inner, outer)
     )
     where = diagnosis.where
     if missing is not None and missing.times:
         first = missing.times[0].recording
         spans = [[t.start, t.stop] for t in missing.times if t.recording == first]
         where = replace(where, recording=first, intervals=sorted(spans))
-    limits = inner.losses.part("the limits", lambda: _limits(found, inner, outer), [])
+    limits = inner.losses.part("the limits", lambda: _limits(conclusion, inner, outer), [])
     diagnosis = replace(
         diagnosis,
         where=where,
@@ -363,46 +369,46 @@ def _physics(
     )
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
-        told = (
+        warning = (
             f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the "
             f"{what} as an effect would, so the probability of an effect of muscles and what they "
             f"move is capped at {100 * _UNKNOWN_GEOMETRY_PROBABILITY:.0f} %"
         )
-        diagnosis = replace(diagnosis, warnings=[told, *diagnosis.warnings])
+        diagnosis = replace(diagnosis, warnings=[warning, *diagnosis.warnings])
     return diagnosis, inner, unjudged
 
 
 def _under_best_law(
-    case: Case, asked: tuple[Hypothesis, ...], inner: Problem, stated: Diagnosis
+    case: Case, considered: tuple[Hypothesis, ...], inner: Problem, stated: Diagnosis
 ) -> Diagnosis:
     """Diagnosis under the best of other laws where the rig file's laws leave a mismatch."""
 
     def divided(rig: Rig) -> tuple[Problem, Problem, list[Unjudged]]:
-        own, held, unjudged, _ = _problems(case.with_rig(rig), inner.settings, asked)
-        return *_on_time(own, held, rig)[:2], unjudged
+        fitted, held_out, unjudged, _ = _problems(case.with_rig(rig), inner.settings, considered)
+        return *_with_offsets(fitted, held_out, rig)[:2], unjudged
 
     best, quiet = stated, Steps(None, within=_JUDGED)
     for choice, recordings in promising_laws(case.rig, inner, stated, divided):
         with suppress(PamrsError):  # a rig that these recordings cannot be of
-            other, _, _ = _physics(case.with_rig(choice.rig), *recordings, quiet)
+            other, _, _ = _diagnose_physics(case.with_rig(choice.rig), *recordings, quiet)
             best = under(choice, other, stated) if is_better(other, best) else best
     return best
 
 
 def _missing(
-    answer: Answer, found: Conclusion, inner: Problem, outer: Problem
+    answer: Answer, conclusion: Conclusion, inner: Problem, outer: Problem
 ) -> MissingInput | None:
     """Missing input of the answer's block; None where it is noise, or was not followed."""
     block = next((b for b in inner.blocks if b.name == answer.block), None)
     if block is None:
         return None
-    models = found.models
+    models = conclusion.models
     named = models.added and models.events is None and answer.verdict == "effects"
     missing = missing_input_of(
         block,
         core_rig(models.baseline),
         _by_role(inner, outer),
-        found.noise_level,
+        conclusion.noise_level,
         named=core_rig(models.final) if named else None,
         margin=inner.settings.noise_margin,
     )
@@ -410,26 +416,28 @@ def _missing(
     return missing.thinned(_MOST_POINTS) if missing is not None and followed else None
 
 
-def _limits(found: Conclusion, inner: Problem, outer: Problem) -> list[Limit]:
+def _limits(conclusion: Conclusion, inner: Problem, outer: Problem) -> list[Limit]:
     """Sizes from which the recordings would have shown effects, and distinguished them."""
-    every, baseline = _together(inner, outer), found.models.baseline
-    left = {
-        b.name: beyond(error.after, error.noise, found.own_errors[b.channel])
+    every, baseline = _all_recordings(inner, outer), conclusion.models.baseline
+    beyond_noise = {
+        b.name: beyond(error.after, error.noise, conclusion.own_errors[b.channel])
         for b in inner.blocks
-        if (error := found.table.get(b.channel))
+        if (error := conclusion.table.get(b.channel))
     }
-    return limits_of(every, baseline, list(free_baseline(every, baseline)), found.noise_level, left)
+    return limits_of(
+        every, baseline, list(free_baseline(every, baseline)), conclusion.noise_level, beyond_noise
+    )
 
 
-def _together(inner: Problem, outer: Problem) -> Problem:
+def _all_recordings(inner: Problem, outer: Problem) -> Problem:
     """All recordings, of every role."""
     return replace(inner, recordings=[p for part in _by_role(inner, outer).values() for p in part])
 
 
 def _by_role(inner: Problem, outer: Problem) -> dict[str, list[Prepared]]:
     """Recordings by their role."""
-    held = {} if outer is inner else {"held_out": outer.recordings}
-    return {"fit": inner.recordings, **held}
+    held_out = {} if outer is inner else {"held_out": outer.recordings}
+    return {"fit": inner.recordings, **held_out}
 
 
 def missing_input(
@@ -492,24 +500,26 @@ def missing_input(
     shortened, _ = averaged_to_need(ready.case.recordings, ready.blocks, name, chosen)
     with _in_range(name):
         inner, outer, _, _ = _problems(replace(ready.case, recordings=shortened), chosen, ())
-        inner, outer, _ = _on_time(inner, outer, ready.case.rig)
+        inner, outer, _ = _with_offsets(inner, outer, ready.case.rig)
         roles = _by_role(inner, outer)
-        every = _together(inner, outer)
+        every = _all_recordings(inner, outer)
         if block is not None:
-            there = {b.name: b for b in inner.blocks}
-            if block not in there:
-                told = meant(str(block), there)
-                raise ParameterError(f"block = {block!r} is not allowed; {told}")
-            every = replace(every, blocks=[there[block]])
+            by_name = {b.name: b for b in inner.blocks}
+            if block not in by_name:
+                suggestion = meant(str(block), by_name)
+                raise ParameterError(f"block = {block!r} is not allowed; {suggestion}")
+            every = replace(every, blocks=[by_name[block]])
         noise_level = noise_levels(every, every.core)
-        own = worst_block(every, noise_level)
-        found = missing_input_of(own, every.core, roles, noise_level, margin=chosen.noise_margin)
-    if found is None:
+        worst = worst_block(every, noise_level)
+        missing = missing_input_of(
+            worst, every.core, roles, noise_level, margin=chosen.noise_margin
+        )
+    if missing is None:
         raise DiagnosisError(
-            f"case {name!r}: block {own.name}: with no input does the model follow a recording; "
+            f"case {name!r}: block {worst.name}: with no input does the model follow a recording; "
             "check the rig's geometry and the recordings' units and columns"
         )
-    return found
+    return missing
 
 
 def _judged_only(
@@ -519,37 +529,37 @@ def _judged_only(
     judged = {block.name for group in groups for block in group.blocks}
     if not judged:
         raise DiagnosisError("; ".join(inner.losses.told))
-    kept = replace(inner, blocks=[b for b in inner.blocks if b.name in judged])
-    return kept, kept if outer is inner else replace(outer, blocks=kept.blocks)
+    fitted = replace(inner, blocks=[b for b in inner.blocks if b.name in judged])
+    return fitted, fitted if outer is inner else replace(outer, blocks=fitted.blocks)
 
 
-def _on_time(inner: Problem, outer: Problem, rig: Rig) -> tuple[Problem, Problem, list[str]]:
+def _with_offsets(inner: Problem, outer: Problem, rig: Rig) -> tuple[Problem, Problem, list[str]]:
     """Recordings, fitted and held out, with commands at the times they acted, and notes on that."""
-    found, said = with_offsets([inner] if outer is inner else [inner, outer], rig)
-    return found[0], found[-1], said
+    shifted, notes = with_offsets([inner] if outer is inner else [inner, outer], rig)
+    return shifted[0], shifted[-1], notes
 
 
-def _asked(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, ...]:
+def _checked_suspicions(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, ...]:
     """Hypotheses that the caller asks for, checked, each once."""
     if isinstance(consider, str):
         raise ValueError(
             f"consider = {consider!r} is not allowed: a list of such texts, [{consider!r}]"
         )
     free = [name for name, parameter in rig.parameters.items() if parameter.tol > 0.0]
-    there = [e for e in CATALOGUE if fits(rig, e)]
+    possible = [e for e in CATALOGUE if fits(rig, e)]
     held = {entry["id"] for entry in rig.effects}
     sets = (tuple(Term.parse(word.strip()) for word in text.split("+")) for text in consider)
-    asked = list(map(Hypothesis, sets))
-    for text, hypothesis in zip(consider, asked, strict=True):
+    hypotheses = list(map(Hypothesis, sets))
+    for text, hypothesis in zip(consider, hypotheses, strict=True):
         if len(hypothesis.set) < len(hypothesis.terms):
             raise ValueError(f"consider: {text!r} is not allowed: it has a name twice")
-    for term in (term for hypothesis in asked for term in hypothesis.terms):
+    for term in (term for hypothesis in hypotheses for term in hypothesis.terms):
         if term.is_effect and term.id in held:
             raise ValueError(
                 f"consider: {str(term)!r} is not allowed: the model holds it already, and it is "
                 "refitted"
             )
-        known = free if term.is_value else there
+        known = free if term.is_value else possible
         if term.id not in known:
             raise ValueError(
                 f"consider: {str(term)!r} is neither an effect that this rig can have nor one of "
@@ -560,22 +570,24 @@ def _asked(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, ...]:
                 rig.with_effect(term.id, at=term.at)
             except ParameterError as error:
                 raise ValueError(f"consider: {str(term)!r} is not allowed: {error}") from error
-    return tuple(dict.fromkeys(asked))
+    return tuple(dict.fromkeys(hypotheses))
 
 
 def _problems(
-    case: Case, settings: DiagnosisSettings, asked: tuple[Hypothesis, ...]
+    case: Case, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...]
 ) -> tuple[Problem, Problem, list[Unjudged], list[str]]:
     """Problems of fitted and held-out recordings, unjudged blocks, notes on unmeasured starts."""
     rig = case.rig
     fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
-    held = [prepare(r, rig, settings) for r in case.held_out if case.fit]
+    held_out = [prepare(r, rig, settings) for r in case.held_out if case.fit]
     channels, least = case.channels, settings.least_block_share
-    blocks, core = blocks_beside_tanks(rig, channels), core_rig(rig)
-    tanks = unread_tanks(rig, channels)
-    fitted, held = ([with_tanks(rig, core, p, tanks) for p in part] for part in (fitted, held))
-    fitted, held = (
-        [with_own_values(blocks, rig, core, p, tanks) for p in part] for part in (fitted, held)
+    blocks, core = blocks_with_tanks(rig, channels), core_rig(rig)
+    tanks = tanks_without_gauge(rig, channels)
+    fitted, held_out = (
+        [with_tanks(rig, core, p, tanks) for p in part] for part in (fitted, held_out)
+    )
+    fitted, held_out = (
+        [with_own_values(blocks, rig, core, p, tanks) for p in part] for part in (fitted, held_out)
     )
     judged = {b.name for b in blocks}
     every_block = unjudged_blocks(rig, channels)
@@ -587,13 +599,15 @@ def _problems(
         if block.name not in judged
     ]
     known = {n: p.tol for n, p in rig.parameters.items() if 0.0 < p.tol < math.inf}
-    fitted, held = ([begun_alike(blocks, core, p, known) for p in part] for part in (fitted, held))
+    fitted, held_out = (
+        [with_unjudged_starts(blocks, core, p, known) for p in part] for part in (fitted, held_out)
+    )
     thin = {
         b.name: share
         for b in blocks
-        if (share := min(_usable_share(b, part) for part in (fitted, held) if part)) < least
+        if (share := min(_usable_share(b, part) for part in (fitted, held_out) if part)) < least
     }
-    begun = said_of_beginnings([b for b in blocks if b.name in thin], [*fitted, *held])
+    start_notes = notes_on_beginnings([b for b in blocks if b.name in thin], [*fitted, *held_out])
     every = blocks
     blocks = [b for b in blocks if b.name not in thin]
     if thin and not blocks:
@@ -601,22 +615,22 @@ def _problems(
             f"case {case.name!r}: too few samples are usable in every block ("
             + ", ".join(f"{name}: {100 * share:.0f} %" for name, share in thin.items())
             + f"); at least {100 * least:.0f} % are needed"
-            + "".join(f"; {told}" for told in begun)
+            + "".join(f"; {text}" for text in start_notes)
         )
-    inner = Problem(blocks, fitted, core, settings, considered=asked)
-    drowned = _drowned(inner, rig)
+    inner = Problem(blocks, fitted, core, settings, considered=considered)
+    drowned = _regulators_in_noise(inner, rig)
     left_out = [b for b in every if b.name in thin or b.name in drowned]
     inner = replace(inner, blocks=[b for b in blocks if b.name not in drowned])
     if not inner.blocks:
-        told = "; ".join(f"block {name}: {reason}" for name, reason in drowned.items())
-        raise DiagnosisError(f"case {case.name!r}: {told}")
-    check_sense(inner.blocks, [*fitted, *held], inner.core, case.name)
+        text = "; ".join(f"block {name}: {reason}" for name, reason in drowned.items())
+        raise DiagnosisError(f"case {case.name!r}: {text}")
+    check_sense(inner.blocks, [*fitted, *held_out], inner.core, case.name)
     why = {
         name: f"only {100 * share:.0f} % of its samples are usable" for name, share in thin.items()
     } | drowned
     unjudged = [*without, *(Unjudged(b.name, b.covers, why[b.name]) for b in left_out)]
-    outer = replace(inner, recordings=held) if held else inner
-    begun += said_of_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
-    begun += said_of_tanks(rig, inner.blocks, inner.recordings)
-    begun += said_of_own([*fitted, *held])
-    return inner, outer, unjudged, begun
+    outer = replace(inner, recordings=held_out) if held_out else inner
+    start_notes += notes_on_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
+    start_notes += notes_on_tanks(rig, inner.blocks, inner.recordings)
+    start_notes += notes_on_own_values([*fitted, *held_out])
+    return inner, outer, unjudged, start_notes

@@ -26,7 +26,7 @@ Divided = tuple[Problem, Problem, list[Unjudged]]
 
 
 def promising_laws(
-    rig: Rig, problem: Problem, found: Diagnosis, prepared: Callable[[Rig], Divided]
+    rig: Rig, problem: Problem, stated_diagnosis: Diagnosis, prepared: Callable[[Rig], Divided]
 ) -> Iterator[tuple[OtherChoice, Divided]]:
     """Other laws, with the recordings under each, whose baseline misses a suspect block by clearly
     less than that of the rig file.
@@ -37,17 +37,17 @@ def promising_laws(
         The rig file's model.
     problem : Problem
         Recordings to fit.
-    found : Diagnosis
+    stated_diagnosis : Diagnosis
         Their diagnosis under the laws of the rig file.
     prepared : callable
         The recordings under another rig.
     """
-    suspects = {part.block for part in found.answer.parts}
+    suspects = {part.block for part in stated_diagnosis.answer.parts}
     for mechanical in (False, True):
-        own = [b for b in problem.blocks if b.mechanical == mechanical]
-        if not any(b.name in suspects for b in own):
+        blocks = [b for b in problem.blocks if b.mechanical == mechanical]
+        if not any(b.name in suspects for b in blocks):
             continue
-        names = [b.name for b in own]
+        names = [b.name for b in blocks]
         stated = _missed(rig, problem, names)
         for choice in other_choices(rig, ("muscle",) if mechanical else ("chamber", "valve")):
             try:
@@ -66,8 +66,8 @@ def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:
     blocks = [b for b in problem.blocks if b.name in names]
     if len(blocks) < len(names):
         return math.inf
-    own = replace(problem, blocks=blocks)
-    return 2.0 * refitted(own, rig, without_autocorrelation(blocks)).cost
+    part = replace(problem, blocks=blocks)
+    return 2.0 * refitted(part, rig, without_autocorrelation(blocks)).cost
 
 
 def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
@@ -78,31 +78,31 @@ def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
     if other.answer.verdict == "unlisted":
         return False
     channels = [m.channel for m in _mismatches(stated)]
-    own, before = (_noises(d.proven, channels) for d in (other, stated))
+    now, before = (_noises(d.proven, channels) for d in (other, stated))
     # a block whose values lie where they hardly can is as much in question as one with a name
     open_to, was = (max(len(d.answer.named), len(d.answer.parts)) for d in (other, stated))
-    return own**2 < _BETTER * before**2 or (open_to < was and own < _NO_WORSE * before)
+    return now**2 < _BETTER * before**2 or (open_to < was and now < _NO_WORSE * before)
 
 
-def _mismatches(found: Diagnosis) -> list[BlockMismatch]:
+def _mismatches(diagnosis: Diagnosis) -> list[BlockMismatch]:
     """Mismatches of the groups of blocks in which something is or may be missing or wrong."""
-    return [m for part in found.answer.parts for m in part.group.mismatch]
+    return [m for part in diagnosis.answer.parts for m in part.group.mismatch]
 
 
 def _noises(errors: Mapping[str, ChannelError], channels: Sequence[str]) -> float:
     """Root mean square error of some channels under a final model [noise levels], at least 1."""
-    left = [errors[c].after / errors[c].noise for c in channels if c in errors]
-    return max(1.0, math.sqrt(math.fsum(x * x for x in left) / max(1, len(left))))
+    sizes = [errors[c].after / errors[c].noise for c in channels if c in errors]
+    return max(1.0, math.sqrt(math.fsum(x * x for x in sizes) / max(1, len(sizes))))
 
 
 def under(choice: OtherChoice, other: Diagnosis, stated: Diagnosis) -> Diagnosis:
     """Diagnosis under another law that names this law; its errors ``before`` are those of the
     user's model, under the law of the rig file.
     """
-    own, before = other.proven, stated.proven
-    both = [m for m in _mismatches(stated) if m.channel in own and m.channel in before]
+    proven, before = other.proven, stated.proven
+    both = [m for m in _mismatches(stated) if m.channel in proven and m.channel in before]
     most = max(both, key=lambda m: before[m.channel].refit / before[m.channel].noise)
-    sizes = before[most.channel].refit, own[most.channel].refit, own[most.channel].noise
+    sizes = before[most.channel].refit, proven[most.channel].refit, proven[most.channel].noise
     law = OtherLaw(choice.name, choice.stated, choice.other, most.channel, most.unit, *sizes)
     fit = replace(
         other.fit,
@@ -142,11 +142,13 @@ def _traces(traces: Sequence[Trace], stated: Sequence[Trace]) -> list[Trace]:
 def _runs(runs: Sequence[FreeRun], stated: Sequence[FreeRun]) -> list[FreeRun]:
     """Free runs whose first column is that of the user's model."""
     before = {(run.recording, c): e for run in stated for c, e in run.channels.items()}
-    found = []
+    with_before = []
     for run in runs:
         channels = dict(run.channels)
         for c, error in run.channels.items():
-            own = before.get((run.recording, c), error)
-            channels[c] = replace(error, before=own.before, cut_before=own.cut_before)
-        found.append(replace(run, channels=channels))
-    return found
+            stated_error = before.get((run.recording, c), error)
+            channels[c] = replace(
+                error, before=stated_error.before, cut_before=stated_error.cut_before
+            )
+        with_before.append(replace(run, channels=channels))
+    return with_before

@@ -59,17 +59,17 @@ def possible_starts(rig: Rig, blocks: Sequence[Block]) -> list[Start]:
     """Every start of every effect that a rig can have and does not have; at each place of an effect
     where some blocks distinguish these.
     """
-    found: list[Start] = []
-    own = {held["id"] for held in rig.effects}
+    starts: list[Start] = []
+    held_ids = {held["id"] for held in rig.effects}
     for effect in CATALOGUE:
         acting = any(acts_in(Term(effect), block) for block in blocks)
-        if effect in own or not acting or not fits(rig, effect):
+        if effect in held_ids or not acting or not fits(rig, effect):
             continue
         places = places_of(rig, effect, list(blocks))
         for term in [Term(effect, at) for at in places] or [Term(effect)]:
             usual = starts_of(term, sealed=rig.model["valve"] is None)
-            found += [s for start in usual if (s := _possible(rig, start)) is not None]
-    return found
+            starts += [s for start in usual if (s := _possible(rig, start)) is not None]
+    return starts
 
 
 def _possible(rig: Rig, start: Start) -> Start | None:
@@ -98,7 +98,7 @@ def products_of(
     starts: Sequence[Start],
     baseline: Sequence[str],
     noise_level: Mapping[Key, NoiseLevel],
-    left: Mapping[str, float] | None = None,
+    unexplained: Mapping[str, float] | None = None,
 ) -> Products:
     """Products of what some recordings show of effects, baseline parameters and the model's error.
 
@@ -114,7 +114,7 @@ def products_of(
         Parameters that may move inside their tolerances.
     noise_level : dict
         By block and recording, with the curves of the model's error.
-    left : dict of str to float, optional
+    unexplained : dict of str to float, optional
         What a diagnosis leaves unexplained by block [noise levels]; more than one counts as noise.
 
     Raises
@@ -130,12 +130,16 @@ def products_of(
     for prepared in problem.recordings:
         for block in problem.blocks:
             place = block, prepared.recording.name
-            found = base[block.name, prepared.recording.name]
+            base_residual = base[block.name, prepared.recording.name]
             level = noise_level[block.name, prepared.recording.name]
-            free = np.zeros((found.value.size, 0)) if found.jacobian is None else found.jacobian
-            means, counts = binned(free * tolerances, found.rows, bins_of(prepared))
+            free = (
+                np.zeros((base_residual.value.size, 0))
+                if base_residual.jacobian is None
+                else base_residual.jacobian
+            )
+            means, counts = binned(free * tolerances, base_residual.rows, bins_of(prepared))
             curves = np.empty((means.shape[0], 0)) if level.curves is None else level.curves
-            noise = level.noise * max(1.0, (left or {}).get(block.name, 1.0))
+            noise = level.noise * max(1.0, (unexplained or {}).get(block.name, 1.0))
             share = counted(prepared, block, problem.settings) / max(1, int((counts > 0).sum()))
             weights[place] = math.sqrt(share) / noise if noise > 0.0 else 0.0
             columns[place] = [curves, means, np.zeros((means.shape[0], len(starts)))]
@@ -152,15 +156,17 @@ def products_of(
                 means, _ = binned(moved, base[key].rows, bins_of(prepared))
                 columns[block, prepared.recording.name][2][:, k] = means
     every = {place: weights[place] * np.hstack(parts) for place, parts in columns.items()}
-    return {place: own.T @ own for place, own in every.items()}
+    return {place: rows.T @ rows for place, rows in every.items()}
 
 
 def _freed(products: Array, count: int) -> Array:
     """Products of the last columns, the first (normal priors of one unit) being fitted out."""
     if count == 0:
         return products
-    own, mixed = products[:count, :count], products[:count, count:]
-    rest: Array = products[count:, count:] - mixed.T @ solve_normal(own + np.eye(count), mixed)
+    fitted_out, mixed = products[:count, :count], products[:count, count:]
+    rest: Array = products[count:, count:] - mixed.T @ solve_normal(
+        fitted_out + np.eye(count), mixed
+    )
     return rest
 
 
@@ -178,8 +184,12 @@ def _beside_error(products: Array, curves: int, copies: Array) -> Array:
     """Products of a block's baseline and signatures after the error of its model is fitted out: its
     curves, and a small copy of every effect (no model errs in functions of place alone).
     """
-    own, signatures = np.split(np.arange(products.shape[0]), [products.shape[0] - copies.size])
-    order = np.concatenate([own[:curves], signatures, own[curves:], signatures])
+    error_and_baseline, signatures = np.split(
+        np.arange(products.shape[0]), [products.shape[0] - copies.size]
+    )
+    order = np.concatenate(
+        [error_and_baseline[:curves], signatures, error_and_baseline[curves:], signatures]
+    )
     rest = np.ones(products.shape[0] - curves)
     scale = np.concatenate([np.ones(curves), np.where(np.isfinite(copies), copies, 0.0), rest])
     return _freed(products[np.ix_(order, order)] * np.outer(scale, scale), curves + copies.size)
@@ -220,7 +230,7 @@ class Limits:
         if not products:
             return
         of_block: dict[Block, Array] = {}
-        own: dict[tuple[Block, str], Array] = {}
+        shown_alone: dict[tuple[Block, str], Array] = {}
         copies: dict[Block, Array] = {}
         for place, values in products.items():
             block, curves = place[0], values.shape[0] - k - count
@@ -229,7 +239,7 @@ class Limits:
             sizes = _copies(values, curves, count)
             copies[block] = np.minimum(copies.get(block, math.inf), sizes)
             alone = np.diag(_freed(values[curves:, curves:], k))
-            own[place] = np.sqrt(np.clip(alone, 0.0, None) / settings.effective_samples)
+            shown_alone[place] = np.sqrt(np.clip(alone, 0.0, None) / settings.effective_samples)
         rest = (_beside_error(v, v.shape[0] - k - count, copies[b]) for b, v in of_block.items())
         total = np.asarray(sum(rest))
         # a parameter beyond its tolerances is a rival, too: its own column without a prior
@@ -239,9 +249,9 @@ class Limits:
         self._best = {names[j]: k + j for j in np.argsort(self._power[k:]).tolist()}
         for name, at in self._best.items():
             j = at - k
-            where = max(own, key=lambda place: float(own[place][j]))
+            where = max(shown_alone, key=lambda place: float(shown_alone[place][j]))
             self.each[name] = self._limit(
-                starts[j], float(own[where][j]), (where[0].name, where[1])
+                starts[j], float(shown_alone[where][j]), (where[0].name, where[1])
             )
         chosen = [self._best[name] for name in self.each]
         information = np.eye(len(chosen)) + free[np.ix_(chosen, chosen)]
@@ -253,18 +263,18 @@ class Limits:
         shared = self._free[self._best[name]] ** 2
         return np.where(showing, shared, 0.0) / np.maximum(self._power, _NOTHING**2)
 
-    def _limit(self, start: Start, left: float, where: tuple[str, str]) -> Limit:
+    def _limit(self, start: Start, shown: float, where: tuple[str, str]) -> Limit:
         """Limit of an effect by the one of its starts that shows most."""
         name = str(start.effect)
         power = float(self._power[self._best[name]])
-        if left < _NOTHING or power <= 0.0:
+        if shown < _NOTHING or power <= 0.0:
             return Limit(name)
         taken = self._taken(name, self._labels != name)
         rival = int(np.argmax(taken))
         distance = math.sqrt(max(power - float(taken[rival]), 0.0))
         named = Limit(
             name,
-            left,
+            shown,
             *where,
             seen=math.sqrt(power),
             distance=distance,
@@ -301,11 +311,11 @@ class Limits:
 
     def _apart(self, one: str, other: str) -> float:
         """Distance of two effects at their typical sizes, the smaller of both ways."""
-        left = (
+        rests = (
             self._power[self._best[a]] - self._taken(a, self._labels == b).max()
             for a, b in ((one, other), (other, one))
         )
-        return math.sqrt(max(min(map(float, left)), 0.0))
+        return math.sqrt(max(min(map(float, rests)), 0.0))
 
 
 def _sized(start: Start, size: float) -> float:
@@ -313,9 +323,9 @@ def _sized(start: Start, size: float) -> float:
     it, or nobody would search for so much.
     """
     leading = start.sizes[0]
-    found = start.scaled(size).free[leading]
-    held = math.isclose(start.scaled(0.999 * size).free[leading], found, rel_tol=1e-9)
-    return math.nan if held or size > _MOST_MULTIPLE else abs(found)
+    value = start.scaled(size).free[leading]
+    held = math.isclose(start.scaled(0.999 * size).free[leading], value, rel_tol=1e-9)
+    return math.nan if held or size > _MOST_MULTIPLE else abs(value)
 
 
 def limits_of(
@@ -323,13 +333,13 @@ def limits_of(
     rig: Rig,
     baseline: Sequence[str],
     noise_level: Mapping[Key, NoiseLevel],
-    left: Mapping[str, float],
+    unexplained: Mapping[str, float],
 ) -> list[Limit]:
     """Limits of every effect that a rig can have, by recordings that are there.
 
     Parameters
     ----------
-    problem, rig, baseline, noise_level, left
+    problem, rig, baseline, noise_level, unexplained
         As of :func:`products_of`.
 
     Raises
@@ -338,6 +348,6 @@ def limits_of(
         If the model leaves the range in which it holds.
     """
     starts = possible_starts(rig, problem.blocks)
-    products = products_of(problem, rig, starts, baseline, noise_level, left)
-    found = Limits(products, starts, baseline, problem.settings).each.values()
-    return [limit for limit in found if limit.block]
+    products = products_of(problem, rig, starts, baseline, noise_level, unexplained)
+    limits = Limits(products, starts, baseline, problem.settings).each.values()
+    return [limit for limit in limits if limit.block]

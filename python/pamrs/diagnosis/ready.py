@@ -13,15 +13,15 @@ from pamrs.diagnosis.fit import holdable, without_passing
 from pamrs.diagnosis.prepare import (
     Block,
     at_ambient,
-    blocks_beside_tanks,
+    blocks_with_tanks,
     check_plausible,
     implausible,
     noted_units,
-    own_of_rig,
     suspected_units,
     uncommanded,
     unusable,
     varying,
+    with_declared_values,
     without_copies,
     without_dead_commands,
     without_impossible,
@@ -88,16 +88,18 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
         If recordings cannot be of this rig (units, swapped columns, dead sensors), or surround no
         block of it.
     """
-    case = replace(case, recordings=own_of_rig(case.rig, case.recordings))
+    case = replace(case, recordings=with_declared_values(case.rig, case.recordings))
     _check_rig(case)
     doubts = [*suspected_units(case), *noted_units(case)]
     try:
-        case, held = _nominal(case, settings)
+        case, notes = _nominal(case, settings)
         alive, dead = without_dead_commands(case.recordings, case.rig)
         case = replace(case, recordings=alive)
         core = core_rig(case.rig)
-        case, left = left_out(case, lambda r: uncommanded(r, case.rig, core.inputs))
-        case, odd = left_out(case, lambda r: "; ".join(implausible(r, case.rig, settings)))
+        case, lacking_commands = left_out(case, lambda r: uncommanded(r, case.rig, core.inputs))
+        case, implausible_ones = left_out(
+            case, lambda r: "; ".join(implausible(r, case.rig, settings))
+        )
         for recording in case.recordings:
             if why := uncommanded(recording, case.rig, core.inputs):
                 raise DiagnosisError(f"recording {recording.name!r}: {why}")
@@ -106,15 +108,15 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
         raise DiagnosisError("\n".join([str(error), *doubts])) from error
     case, clipped, copies, masked = _sound(case, settings)
     case, empty = left_out(case, lambda r: unusable(r, case.rig, core, settings))
-    suspected = [*left, *odd, *empty]
-    blocks = blocks_beside_tanks(case.rig, case.channels)
+    suspected = [*lacking_commands, *implausible_ones, *empty]
+    blocks = blocks_with_tanks(case.rig, case.channels)
     if not blocks:
-        told = (
+        message = (
             f"case {case.name!r}: its channels ({', '.join(case.channels)}) do not surround any "
             f"block of the rig ({', '.join(case.rig.blocks)}); measure {_lacking(case)}"
         )
-        raise DiagnosisError("\n".join([told, *suspected]))
-    return Ready(case, blocks, suspected, doubts, [*copies, *held], masked, [*dead, *clipped])
+        raise DiagnosisError("\n".join([message, *suspected]))
+    return Ready(case, blocks, suspected, doubts, [*copies, *notes], masked, [*dead, *clipped])
 
 
 def left_out(case: Case, fault: Callable[[Recording], str]) -> tuple[Case, list[str]]:
@@ -135,10 +137,10 @@ def left_out(case: Case, fault: Callable[[Recording], str]) -> tuple[Case, list[
         A sentence for each recording that is left out.
     """
     faults = {r.name: why for r in case.recordings if (why := fault(r))}
-    kept = replace(case, recordings=[r for r in case.recordings if r.name not in faults])
-    if not faults or not (kept.fit if case.fit else kept.recordings):
+    rest = replace(case, recordings=[r for r in case.recordings if r.name not in faults])
+    if not faults or not (rest.fit if case.fit else rest.recordings):
         return case, []
-    return kept, [f"recording {name!r} is left out: {why}" for name, why in faults.items()]
+    return rest, [f"recording {name!r} is left out: {why}" for name, why in faults.items()]
 
 
 def _check_rig(case: Case) -> None:
@@ -163,60 +165,60 @@ def _check_rig(case: Case) -> None:
 
 def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
     """Case with the rig as far as it is known before any fit, and sentences on that."""
-    rig, said = at_ambient(case.rig, case.recordings, settings)
-    told = [*said, *_said_of_held(rig), *_said_of_inlets(rig, case.channels)]
-    return replace(case, rig=without_passing(rig)), told
+    rig, notes = at_ambient(case.rig, case.recordings, settings)
+    every_note = [*notes, *_notes_on_held(rig), *_notes_on_inlets(rig, case.channels)]
+    return replace(case, rig=without_passing(rig)), every_note
 
 
 def _sound(
     case: Case, settings: DiagnosisSettings
 ) -> tuple[Case, list[Faulty], list[str], list[str]]:
     """Case with impossible samples masked; faults of sensors, copies, and other notes."""
-    kept, clipped = without_rails(case.recordings)
-    kept, masked = without_impossible(kept, case.rig, settings)
-    kept, copies = without_copies(kept)
-    kept, unread = without_poor_thermometers(kept, case.rig)
-    return replace(case, recordings=kept), clipped, copies, [*masked, *unread]
+    recordings, clipped = without_rails(case.recordings)
+    recordings, masked = without_impossible(recordings, case.rig, settings)
+    recordings, copies = without_copies(recordings)
+    recordings, poor = without_poor_thermometers(recordings, case.rig)
+    return replace(case, recordings=recordings), clipped, copies, [*masked, *poor]
 
 
-def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
+def _notes_on_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
     """Tanks in front of regulators that nobody measured, in words."""
-    said = []
+    notes = []
     for name, ports in rig.ports("supply").items():
         inlet = block_of(ports.get("inlet", ""))
         table = rig.tables("supply").get(inlet) if ports.get("inlet") else None
-        gauge, begun = dotted("supply_pressure", inlet), qualified("supply", inlet)
-        begun = f"{begun}.initial_pressure"
+        gauge, first_pressure = dotted("supply_pressure", inlet), qualified("supply", inlet)
+        first_pressure = f"{first_pressure}.initial_pressure"
         if table is not None and table["kind"] == "tank" and gauge not in channels:
-            said.append(
+            notes.append(
                 f"{gauge} was not recorded: {qualified('supply', name)} is taken to have "
-                f"{rig.units.said(begun, 'Pa', table['initial_pressure'])} in front of it "
+                f"{rig.units.said(first_pressure, 'Pa', table['initial_pressure'])} in front of it "
                 "throughout; record it where the tank may come near to what the regulator is set to"
             )
-    return said
+    return notes
 
 
-def _said_of_held(rig: Rig) -> list[str]:
+def _notes_on_held(rig: Rig) -> list[str]:
     """Sentences on effects that the model holds already, and on those that it cannot hold."""
 
-    def told(entry: dict[str, Any]) -> str:
+    def named(entry: dict[str, Any]) -> str:
         place = f" at {entry['at']}" if "at" in entry else ""
         return f"{EFFECTS[entry['id']].name} ({entry['id']}{place})"
 
-    held = [told(entry) for entry in rig.effects if holdable(entry)]
-    passing = [told(entry) for entry in rig.effects if not holdable(entry)]
-    said = []
+    held = [named(entry) for entry in rig.effects if holdable(entry)]
+    passing = [named(entry) for entry in rig.effects if not holdable(entry)]
+    notes = []
     if held:
-        said.append(
+        notes.append(
             f"the model holds already: {', '.join(held)}; the parameters of each were refitted "
             "with those of the rig, and it is not named again"
         )
     if passing:
-        said.append(
+        notes.append(
             f"taken out of the model before the diagnosis: {', '.join(passing)}; what happens at "
             "times of its own in each recording, or is a form without a name, is looked for anew"
         )
-    return said
+    return notes
 
 
 def _lacking(case: Case) -> str:
@@ -229,9 +231,9 @@ def _lacking(case: Case) -> str:
     names += [dotted("joint_angle", name) for name in rig.tables("joint")]
     names += ["length"] if rig.model["load"] else []
     names += ["force"] if (rig.model["load"] or {}).get("kind") == "frame" else []
-    told = []
+    missing = []
     for name in (name for name in (*names, *core_rig(rig).inputs) if name not in case.channels):
         without = [r.name for r in case.recordings if name not in r.channels]
         some = len(without) < len(case.recordings)
-        told.append(f"{name} (not in {', '.join(without)})" if some else name)
-    return ", ".join(told)
+        missing.append(f"{name} (not in {', '.join(without)})" if some else name)
+    return ", ".join(missing)

@@ -191,14 +191,14 @@ class Diagnosis(View, Findings):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON file: null for no number."""
-        own = [
+        names = [
             f.name
             for f in dataclasses.fields(self)
             if f.metadata.get("json", True) and f.name != "settings"
         ]
-        found = {name: to_plain(getattr(self, name)) for name in own}
-        told = {"settings": self.settings.to_dict(), "version": __version__}
-        return {"schema": SCHEMA, "answer": to_plain(self.answer), **found, **told}
+        fields = {name: to_plain(getattr(self, name)) for name in names}
+        made_by = {"settings": self.settings.to_dict(), "version": __version__}
+        return {"schema": SCHEMA, "answer": to_plain(self.answer), **fields, **made_by}
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """Return the result as strict JSON (schema `pamrs.diagnosis/2`).
@@ -270,9 +270,9 @@ class Diagnosis(View, Findings):
 def _draw_trace(axes: Any, trace: Trace) -> None:
     """Draw a channel as measured, by the rig file's model, and by the model with what was found."""
     unit, factor = laboratory_unit(trace.channel)
-    own = ("black", *COLOURS[1::-1])
+    colours = ("black", *COLOURS[1::-1])
     kinds = ("measured", "before", "after")
-    for kind, colour in zip(kinds, own, strict=True):
+    for kind, colour in zip(kinds, colours, strict=True):
         values = factor * getattr(trace, kind)
         axes.plot(trace.time, values, color=colour, lw=1.0, label=_CURVES[kind])
     axes.set_title(f"{trace.recording} ({trace.role})", fontsize="medium")
@@ -345,22 +345,22 @@ def load_result(path: str | os.PathLike[str]) -> Diagnosis:
     if file.is_dir():
         file = file / "result.json"
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
+        content = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise DiagnosisError(f"{file}: cannot be read ({error.strerror})") from None
     except (ValueError, RecursionError) as error:
         raise DiagnosisError(f"{file}: is not the JSON of a result ({error})") from None
-    given = found.get("schema") if isinstance(found, dict) else None
+    given = content.get("schema") if isinstance(content, dict) else None
     if given not in READABLE:
         raise DiagnosisError(
             f"{file}: schema = {given!r} is not allowed: {' or '.join(READABLE)} is needed"
         )
-    missing = [key for key in _NEEDED if key not in found]
+    missing = [key for key in _NEEDED if key not in content]
     if missing:
         raise DiagnosisError(f"{file}: is no complete result ({', '.join(missing)} is missing)")
-    settings = found.pop("settings", {})
+    settings = content.pop("settings", {})
     try:
-        values = {"case": file.absolute().parent.name} | fields_from(Diagnosis, found)
+        values = {"case": file.absolute().parent.name} | fields_from(Diagnosis, content)
         return _Read(**values, settings=DiagnosisSettings.from_dict(settings))
     except (TypeError, ValueError, AttributeError) as error:
         raise DiagnosisError(f"{file}: is no complete result ({error})") from None

@@ -103,7 +103,7 @@ class Experiment:
         )
 
 
-class Told(Formatter):
+class QuantityFormatter(Formatter):
     """Formatter of the texts of experiments, in the units of a rig's file.
 
     Numbers that a text marks ``{level:bar}``, ``{length:mm.3g}``, are in that unit, and told in the

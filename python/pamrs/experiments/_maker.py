@@ -32,7 +32,7 @@ from pamrs.experiments._chains import (
 )
 from pamrs.experiments._experiment import (
     Experiment,
-    Told,
+    QuantityFormatter,
     in_bar,
     in_mm,
     limited,
@@ -114,7 +114,7 @@ def _rounded(frequencies: Array) -> list[float]:
 
 
 def _rounded_levels(
-    row: Row, span: Range, rounded: Callable[[float], float], told: Told
+    row: Row, span: Range, rounded: Callable[[float], float], told: QuantityFormatter
 ) -> dict[str, Any]:
     """Levels of a row and reaches around them, rounded as texts have them."""
     level = [rounded(span.at(share)) for share in row.get("told", row.get("levels", ()))]
@@ -154,9 +154,9 @@ class Maker:
     highest: float | Mapping[str, float] | None
 
     @cached_property
-    def told(self) -> Told:
+    def told(self) -> QuantityFormatter:
         """Formatter of texts in the units of the rig's file."""
-        return Told(self.rig)
+        return QuantityFormatter(self.rig)
 
     @cached_property
     def spans(self) -> Spans:

@@ -15,7 +15,7 @@ import numpy as np
 from pamrs.channels import dotted
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments._chains import Range, chains_of, is_sealed, joined, pressure_range
-from pamrs.experiments._experiment import Experiment, Told, in_bar
+from pamrs.experiments._experiment import Experiment, QuantityFormatter, in_bar
 from pamrs.experiments._frame import Rates, Seen, frame_of, seen_in
 from pamrs.experiments._maker import Maker, rows
 from pamrs.recordings import Recording
@@ -38,7 +38,7 @@ _MOST_BLOWN_SAMPLES = 3000
 
 def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experiment]:
     """Experiments of sealed chambers: all filled and left alone; of joined ones, also one alone."""
-    chambers, told = list(rig.tables("chamber")), Told(rig)
+    chambers, told = list(rig.tables("chamber")), QuantityFormatter(rig)
     segments = any(line.get("segments") for line in rig.tables("line").values())
     outlets = any(ends["to"] == "ambient" for ends in rig.ports("line").values())
     out = []

@@ -67,8 +67,8 @@ def case_verdict(verdicts: Iterable[str], *, missed: bool = False) -> str:
     missed : bool
         Whether the whole rig misses more than they say: then something is missing.
     """
-    found = {*verdicts, *(("unlisted",) if missed else ())}
-    return next((v for v in ("effects", "unlisted", "parameters") if v in found), "none")
+    every = {*verdicts, *(("unlisted",) if missed else ())}
+    return next((v for v in ("effects", "unlisted", "parameters") if v in every), "none")
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,16 +268,16 @@ def _part(group: BlockVerdict, places: Mapping[str, str | None], enough: float) 
     chance = chance_of(chances, leading)
     if names and chances and not chance >= max(chances.values()):
         # named by what its sets have in common
-        own = Part(group, None, ((leading, chance),), True, False)
-        chance, together = min(map(own.with_name, names)), True
+        shared = Part(group, None, ((leading, chance),), True, False)
+        chance, together = min(map(shared.with_name, names)), True
     if not names and group.verdict in HEALTHY:
         chance = math.fsum(chances.get(key, 0.0) for key in HEALTHY) if chances else math.nan
-    left = [(leading, chance)]
+    open_answers = [(leading, chance)]
     for other in group.ambiguity if len(group.ambiguity) > 1 else []:
         same = set(other) == set(leading) or (other[0] in HEALTHY and leading[0] in HEALTHY)
-        left += [] if same else [(tuple(other), chance_of(chances, other))]
-    sure = len(left) == 1 and not chance <= enough
-    return Part(group, _block(group, places), tuple(left), together, sure)
+        open_answers += [] if same else [(tuple(other), chance_of(chances, other))]
+    sure = len(open_answers) == 1 and not chance <= enough
+    return Part(group, _block(group, places), tuple(open_answers), together, sure)
 
 
 def _block(group: BlockVerdict, places: Mapping[str, str | None]) -> str | None:
@@ -291,12 +291,12 @@ def _block(group: BlockVerdict, places: Mapping[str, str | None]) -> str | None:
 
 def _refit_noises(part: Part, errors: Mapping[str, ChannelError]) -> float:
     """Error of the refitted model in the block of a part [noise levels]."""
-    own = next((m for m in part.group.mismatch if m.block == part.block), None)
-    if own is None:
+    mismatch = next((m for m in part.group.mismatch if m.block == part.block), None)
+    if mismatch is None:
         return 0.0
-    error = errors.get(own.channel)
+    error = errors.get(mismatch.channel)
     if error is None or not error.noise > 0.0 or not math.isfinite(error.refit):
-        return own.fitted.refit.noises
+        return mismatch.fitted.refit.noises
     return error.refit / error.noise
 
 
@@ -306,14 +306,14 @@ def _missed_by_blocks(
     """Channels that the final model misses in its blocks, on the recordings of the proof, the
     largest first.
     """
-    found = []
-    for own in (m for group in groups for m in group.mismatch if m.channel in errors):
-        error = errors[own.channel]
-        more = beyond(error.after, error.noise, own.model_error)
+    missed = []
+    for mismatch in (m for group in groups for m in group.mismatch if m.channel in errors):
+        error = errors[mismatch.channel]
+        more = beyond(error.after, error.noise, mismatch.model_error)
         if more > MOST_MISSED:
             sizes = (error.after, error.before, error.after / error.noise)
-            found.append(Missed(own.block, own.channel, own.unit, *sizes, more))
-    return sorted(found, key=lambda own: -own.beyond)
+            missed.append(Missed(mismatch.block, mismatch.channel, mismatch.unit, *sizes, more))
+    return sorted(missed, key=lambda mismatch: -mismatch.beyond)
 
 
 def _missed_by_whole(groups: Sequence[BlockVerdict], runs: Sequence[FreeRun]) -> list[Missed]:
@@ -322,13 +322,13 @@ def _missed_by_whole(groups: Sequence[BlockVerdict], runs: Sequence[FreeRun]) ->
     """
     own_errors = {m.channel: m.model_error for group in groups for m in group.mismatch}
     worst: dict[str, Missed] = {}
-    told = [(c, e) for run in runs for c, e in run.channels.items() if e.off and e.noise]
-    for channel, error in told:
+    off_channels = [(c, e) for run in runs for c, e in run.channels.items() if e.off and e.noise]
+    for channel, error in off_channels:
         more = beyond(error.after, error.noise or 0.0, own_errors.get(channel, 0.0))
         if more > max(MOST_MISSED, worst[channel].beyond if channel in worst else 0.0):
             sizes = (error.after, error.before, error.noises)
             worst[channel] = Missed(None, channel, error.unit, *sizes, more)
-    return sorted(worst.values(), key=lambda own: -own.beyond)
+    return sorted(worst.values(), key=lambda missed: -missed.beyond)
 
 
 def _model(parts: Sequence[Part], *, changed: bool) -> str:

@@ -80,7 +80,7 @@ def compare_results(
         return {name: (one.get(name), other.get(name)) for name in one | other}
 
     ranked = sorted(each(_candidates).items(), key=lambda item: -max(v or 0.0 for v in item[1]))
-    found = Compared(
+    compared = Compared(
         names=names,
         verdict=(first["verdict"], second["verdict"]),
         block=(first["where"]["block"], second["where"]["block"]),
@@ -89,8 +89,8 @@ def compare_results(
         missed=each(_missed),
         free_run=each(_free_run),
     )
-    found.changed.extend(_changed(found, first, second))
-    return found
+    compared.changed.extend(_changed(compared, first, second))
+    return compared
 
 
 def _candidates(result: Mapping[str, Any]) -> dict[str, float]:
@@ -99,27 +99,27 @@ def _candidates(result: Mapping[str, Any]) -> dict[str, float]:
     """
     located = result["where"]["block"]
     judged = [b for b in result["blocks"] if b["verdict"] != NOT_JUDGED]
-    own = [b["probabilities"] for b in judged if located in b["blocks"]]
-    found = dict(own[0] if own else result["probabilities"])
+    located_chances = [b["probabilities"] for b in judged if located in b["blocks"]]
+    chances = dict(located_chances[0] if located_chances else result["probabilities"])
     for block in judged:
         for name, p in block["probabilities"].items():
-            if name not in VERDICTS and p > found.get(name, 0.0):
-                found[name] = p
-    return found
+            if name not in VERDICTS and p > chances.get(name, 0.0):
+                chances[name] = p
+    return chances
 
 
 def _parameters(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Parameters of what is named, then of the rig."""
     named = result["effects"] if result["verdict"] == "effects" else []
-    found = {
-        f"{_term(effect)}.{name}": own
+    named_parameters = {
+        f"{_term(effect)}.{name}": parameter
         for effect in named
-        for name, own in effect["parameters"].items()
+        for name, parameter in effect["parameters"].items()
     }
-    found |= {own["name"]: own for own in result["wrong_parameters"]}
-    every = result["parameters"] | found
+    named_parameters |= {parameter["name"]: parameter for parameter in result["wrong_parameters"]}
+    every = result["parameters"] | named_parameters
     keys = ("value", "std", "unit", "identifiable")
-    return {n: {k: every[n].get(k) for k in keys} for n in [*found, *every]}
+    return {n: {k: every[n].get(k) for k in keys} for n in [*named_parameters, *every]}
 
 
 def _missed(result: Mapping[str, Any]) -> dict[str, float]:
@@ -136,36 +136,38 @@ def _free_run(result: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def _changed(found: Compared, first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
+def _changed(compared: Compared, first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
     """Sentences on what changed from one result to the other."""
-    told = []
-    for what, (one, other) in (("verdict", found.verdict), ("block", found.block)):
+    sentences = []
+    for what, (one, other) in (("verdict", compared.verdict), ("block", compared.block)):
         if one != other:
-            told.append(f"{what}: {one or 'none'} before, now {other or 'none'}")
+            sentences.append(f"{what}: {one or 'none'} before, now {other or 'none'}")
     before, now = _named(first), _named(second)
-    told += [f"{name} is named now" for name in sorted(now - before)]
+    sentences += [f"{name} is named now" for name in sorted(now - before)]
     held = {name.partition(".")[0] for name in second["parameters"]}
     for name in sorted(before - now):
-        told.append(f"{name} is {'held by the model' if name in held else 'not named any more'}")
-    for name, (p, q) in found.candidates.items():
+        sentences.append(
+            f"{name} is {'held by the model' if name in held else 'not named any more'}"
+        )
+    for name, (p, q) in compared.candidates.items():
         if abs((p or 0.0) - (q or 0.0)) >= LIKELY:
-            told.append(f"probability of {name}: {p or 0.0:.2f} before, now {q or 0.0:.2f}")
-    for name, (old, new) in found.parameters.items():
+            sentences.append(f"probability of {name}: {p or 0.0:.2f} before, now {q or 0.0:.2f}")
+    for name, (old, new) in compared.parameters.items():
         if old and new and (apart := _apart(old, new)) >= CLEARLY:
             now_told = with_unit(f"{new['value']:.4g}", new["unit"] or "")
             values = f"{old['value']:.4g} before, now {now_told}"
-            told.append(f"{name}: {values} ({apart:.1f} standard deviations)")
-    for table, what in ((found.missed, "missed of"), (found.free_run, "free run of")):
+            sentences.append(f"{name}: {values} ({apart:.1f} standard deviations)")
+    for table, what in ((compared.missed, "missed of"), (compared.free_run, "free run of")):
         for name, (size, new_size) in table.items():
             if size and new_size and not 1.0 / FARTHER < new_size / size < FARTHER:
-                told.append(f"{what} {name}: {new_size / size:.2g} times what it was")
+                sentences.append(f"{what} {name}: {new_size / size:.2g} times what it was")
     for key in ("inputs", "settings", "version"):
         one, other = first.get(key), second.get(key)
         if one != other and one is not None and other is not None:
-            told.append(
+            sentences.append(
                 f"version {one} and {other}" if key == "version" else _differ(key, one, other)
             )
-    return told
+    return sentences
 
 
 def _differ(what: str, one: Mapping[str, Any], other: Mapping[str, Any]) -> str:

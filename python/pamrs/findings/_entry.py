@@ -80,16 +80,16 @@ def to_plain(value: Any) -> Any:
 
 
 def _entry(entry: Entry) -> dict[str, Any]:
-    found = {}
+    content = {}
     for field in dataclasses.fields(entry):
         value, meta = getattr(entry, field.name), field.metadata
         absent = meta.get("optional") and value is None
         empty = meta.get("omit_empty") and value == []
         if meta.get("json", True) and not absent and not empty:
-            found[meta.get("key") or field.name] = to_plain(value)
-    if "unit" in found:
-        found["unit"] = found["unit"] or "1"  # of a plain number
-    return found
+            content[meta.get("key") or field.name] = to_plain(value)
+    if "unit" in content:
+        content["unit"] = content["unit"] or "1"  # of a plain number
+    return content
 
 
 def from_plain(hint: Any, value: Any) -> Any:
@@ -109,8 +109,8 @@ def from_plain(hint: Any, value: Any) -> Any:
     """
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin in (types.UnionType, typing.Union):
-        (own,) = [one for one in inner if one is not type(None)]
-        return None if value is None else from_plain(own, value)
+        (only,) = [one for one in inner if one is not type(None)]
+        return None if value is None else from_plain(only, value)
     if origin is list:
         return [from_plain(inner[0], one) for one in value]
     if origin in (dict, Mapping):
@@ -128,9 +128,9 @@ def fields_from(cls: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of a dataclass from the fields of it that were written; as :func:`from_plain`."""
     if not isinstance(given, Mapping):
         raise TypeError(f"{given!r} is no table of {cls.__name__}")
-    hints, found = typing.get_type_hints(cls), {}
+    hints, arguments = typing.get_type_hints(cls), {}
     for field in dataclasses.fields(cls):
         key = field.metadata.get("key") or field.name
         if field.metadata.get("json", True) and key in given:
-            found[field.name] = from_plain(hints[field.name], given[key])
-    return found
+            arguments[field.name] = from_plain(hints[field.name], given[key])
+    return arguments

@@ -267,7 +267,7 @@ class Findings:
             self.probabilities,
             {w.name: w.block for w in self.wrong_parameters},
             enough=self.settled,
-            form=any(kept.form for kept in self.unexplained),
+            form=any(entry.form for entry in self.unexplained),
             other_law=bool(self.laws),
         )
 

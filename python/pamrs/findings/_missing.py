@@ -189,44 +189,47 @@ def shown_unit(unit: str) -> tuple[str, float]:
     return f"{name}{slash}{second}", factor
 
 
-def _draw(found: MissingInput, axes: Any) -> None:
+def _draw(missing: MissingInput, axes: Any) -> None:
     """Draw the input with its band over its argument, up and down strokes apart; without an
     argument over time, of the recording that has most of it.
     """
-    argument, told = found.argument or "time", found.recordings
+    argument, recordings = missing.argument or "time", missing.recordings
     if argument == "time":
-        told = [max(told, key=lambda own: float(np.mean(own.value**2)))]
-    unit, factor = shown_unit(found.unit)
-    of, scale = shown_unit(found.units[argument])
-    x = scale * np.concatenate([own.along(argument) for own in told])
-    y, std = (factor * np.concatenate([getattr(own, n) for own in told]) for n in ("value", "std"))
-    up = np.concatenate([own.arguments[found.rate] for own in told]) > 0.0
-    laws = [own.law for own in told if own.law is not None]
-    law = factor * np.concatenate(laws) if len(laws) == len(told) else None
+        recordings = [max(recordings, key=lambda recording: float(np.mean(recording.value**2)))]
+    unit, factor = shown_unit(missing.unit)
+    of, scale = shown_unit(missing.units[argument])
+    x = scale * np.concatenate([recording.along(argument) for recording in recordings])
+    y, std = (
+        factor * np.concatenate([getattr(recording, n) for recording in recordings])
+        for n in ("value", "std")
+    )
+    up = np.concatenate([recording.arguments[missing.rate] for recording in recordings]) > 0.0
+    laws = [recording.law for recording in recordings if recording.law is not None]
+    law = factor * np.concatenate(laws) if len(laws) == len(recordings) else None
     both = [(up, "up stroke", COLOURS[0]), (~up, "down stroke", COLOURS[1])]
     strokes = [one for one in both if one[0].any()]
     for rows, _, colour in strokes:
         axes.plot(x[rows], y[rows], ".", color=colour, ms=3.0, alpha=0.4, rasterized=True)
     if argument == "time":
-        strokes = [(np.ones_like(up), told[0].recording, "#6b7280")]
+        strokes = [(np.ones_like(up), recordings[0].recording, "#6b7280")]
     ends = []
     for rows, name, colour in strokes:
         columns = (x[rows], y[rows], std[rows] ** 2, (y if law is None else law)[rows])
-        there, middle, wide, named = _means(columns, _POINTS[argument == "time"])
+        places, middle, wide, named = _means(columns, _POINTS[argument == "time"])
         band = 2.0 * np.sqrt(wide)
-        axes.fill_between(there, middle - band, middle + band, color=colour, alpha=0.25, lw=0.0)
-        axes.plot(there, middle, color=colour, lw=1.4, label=name)
+        axes.fill_between(places, middle - band, middle + band, color=colour, alpha=0.25, lw=0.0)
+        axes.plot(places, middle, color=colour, lw=1.4, label=name)
         every = np.concatenate([middle - band, middle + band, named])
         ends += [float(every.min()), float(every.max())]
         if law is not None:
             last = "what is named" if name == strokes[-1][1] else None
-            axes.plot(there, named, color="black", lw=1.2, ls="--", label=last)
+            axes.plot(places, named, color="black", lw=1.2, ls="--", label=last)
     axes.axhline(0.0, color="#6b7280", lw=0.7)
     room = _ROOM * (max(ends) - min(ends))
     axes.set_ylim(min(ends) - room, max(ends) + room)  # single points may be far outside the band
-    axes.set_title(textwrap.fill(f"Missing: {found.sentence}", _LETTERS), fontsize="medium")
+    axes.set_title(textwrap.fill(f"Missing: {missing.sentence}", _LETTERS), fontsize="medium")
     axes.set_xlabel(f"{argument.replace('_', ' ')} [{of}]")
-    axes.set_ylabel(f"missing, {found.block.replace('_', ' ')} [{unit}]")
+    axes.set_ylabel(f"missing, {missing.block.replace('_', ' ')} [{unit}]")
     axes.legend(fontsize="small", frameon=False, title="band: ± 2 std")
 
 
@@ -234,4 +237,4 @@ def _means(columns: Sequence[Array], most: int) -> list[Array]:
     """Means of so many groups of points at most along the first column."""
     order = np.argsort(columns[0], kind="stable")
     groups = np.array_split(order, min(most, max(1, order.size // _LEAST_IN_POINT)))
-    return [np.array([float(own[g].mean()) for g in groups if g.size]) for own in columns]
+    return [np.array([float(column[g].mean()) for g in groups if g.size]) for column in columns]

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from pamrs._arrays import Array, Index, Mask
-from pamrs.fit._estimate import Estimate, Problem
+from pamrs.fit._estimate import Estimate, MapProblem
 from pamrs.fit._statistics import FitParameter
 from pamrs.units import with_unit
 
@@ -33,13 +33,13 @@ _LOOP: Final = 4.0  # standard errors
 
 
 def cautions(
-    problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str], parameters: Parameters
+    problem: MapProblem, found: Estimate, rows: Mask, labels: Sequence[str], parameters: Parameters
 ) -> list[str]:
     """Every warning of a fit, in words.
 
     Parameters
     ----------
-    problem : Problem
+    problem : MapProblem
         Data and unknowns.
     found : Estimate
         The fit.
@@ -63,7 +63,7 @@ def cautions(
     ]
 
 
-def _range(problem: Problem, found: Estimate, rows: Mask, unknowns: int) -> list[str]:
+def _range(problem: MapProblem, found: Estimate, rows: Mask, unknowns: int) -> list[str]:
     """Cautions about lengths, pressures or points that are too few for the unknowns."""
     notes = []
     span = float(np.ptp(problem.length[rows])) / problem.blank.parameters["rest_length"]
@@ -108,7 +108,7 @@ def _moduli(found: Estimate, parameters: Parameters) -> list[str]:
     return notes
 
 
-def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list[str]:
+def _geometry(problem: MapProblem, found: Estimate, parameters: Parameters) -> list[str]:
     """Cautions about free geometry that the points hardly determine, or that moved far from its
     nominal.
     """
@@ -138,7 +138,7 @@ def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list
     return notes
 
 
-def _points(problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str]) -> list[str]:
+def _points(problem: MapProblem, found: Estimate, rows: Mask, labels: Sequence[str]) -> list[str]:
     """Cautions about points that the others do not predict."""
     apart = outlying(problem, found, rows)
     if not apart:
@@ -156,7 +156,7 @@ def _points(problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str]
     return [f"{words}: further from the other points than {apart_by}; check {which}"]
 
 
-def outlying(problem: Problem, found: Estimate, rows: Mask) -> list[tuple[int, float]]:
+def outlying(problem: MapProblem, found: Estimate, rows: Mask) -> list[tuple[int, float]]:
     """Points that stand apart, one after the other: each is taken away before the next is sought.
 
     The error of a point predicted by the others is ``r_i / (1 - h_i)`` with the hat matrix, its
@@ -165,7 +165,7 @@ def outlying(problem: Problem, found: Estimate, rows: Mask) -> list[tuple[int, f
 
     Parameters
     ----------
-    problem : Problem
+    problem : MapProblem
         Data and unknowns.
     found : Estimate
         The fit.
@@ -220,7 +220,7 @@ def _basis(matrix: Array) -> Array:
     return np.asarray(np.linalg.qr(matrix / np.linalg.norm(matrix, axis=0))[0])
 
 
-def _loops(problem: Problem, found: Estimate, rows: Mask) -> list[str]:
+def _loops(problem: MapProblem, found: Estimate, rows: Mask) -> list[str]:
     """Cautions about directions of motion: only one, exchanged, or loops without friction."""
     way, force = problem.direction[rows], problem.force[rows]
     rubs = problem.blank.has_friction

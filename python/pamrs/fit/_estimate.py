@@ -56,7 +56,7 @@ _UNKNOWN = Known((), math.inf)
 
 
 @dataclass(frozen=True)
-class Problem:
+class MapProblem:
     """Rows of a force map and what is to be fitted to them; all arrays ``(n,)``.
 
     ``knot`` is the pressure that the moduli see: that of the row, or of its level when moduli are
@@ -190,12 +190,12 @@ class Estimate:
     success: bool
 
 
-def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Estimate:
+def estimate(problem: MapProblem, rows: Mask, start: Estimate | None = None) -> Estimate:
     """Fit some rows of a problem.
 
     Parameters
     ----------
-    problem : Problem
+    problem : MapProblem
         Data and unknowns.
     rows : (n,) bool array
         The rows to fit.
@@ -229,7 +229,7 @@ def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Est
     return _search(problem, design, rows, start)
 
 
-def _check_counts(problem: Problem, design: Design, rows: Mask) -> None:
+def _check_counts(problem: MapProblem, design: Design, rows: Mask) -> None:
     """Refuse a fit with fewer points than unknowns, by level where the moduli are free at each."""
     n, k = int(rows.sum()), len(design.names)
     # a coefficient with a prior needs no point
@@ -275,7 +275,7 @@ def _check_counts(problem: Problem, design: Design, rows: Mask) -> None:
         )
 
 
-def _hint(problem: Problem, rows: Mask) -> str:
+def _hint(problem: MapProblem, rows: Mask) -> str:
     lengths = np.unique(np.round(problem.length[rows], 9))
     span = (lengths[-1] - lengths[0]) / problem.blank.parameters["rest_length"]
     return (
@@ -286,7 +286,7 @@ def _hint(problem: Problem, rows: Mask) -> str:
 
 
 def _at(
-    problem: Problem,
+    problem: MapProblem,
     design: Design,
     rows: Mask,
     blank: Muscle,
@@ -315,13 +315,13 @@ def _at(
 
 
 def geometry_slopes(
-    problem: Problem, values: Array, function: Callable[[Muscle], Array], n: int
+    problem: MapProblem, values: Array, function: Callable[[Muscle], Array], n: int
 ) -> Array:
     """Finite differences of a function of the muscle over the free geometry.
 
     Parameters
     ----------
-    problem : Problem
+    problem : MapProblem
         Names and scales of the free geometry.
     values : (q,) array
         Where to take them.
@@ -351,7 +351,7 @@ def geometry_slopes(
     return slopes
 
 
-def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None) -> Estimate:
+def _search(problem: MapProblem, design: Design, rows: Mask, start: Estimate | None) -> Estimate:
     """Variable projection: least squares over the geometry, with the coefficients solved exactly
     inside.
 
@@ -396,7 +396,7 @@ class _Geometry:
 
     Parameters
     ----------
-    problem : Problem
+    problem : MapProblem
         Data and unknowns.
     design : Design
         Of the fitted rows.
@@ -404,7 +404,7 @@ class _Geometry:
         The rows to fit.
     """
 
-    def __init__(self, problem: Problem, design: Design, rows: Mask) -> None:
+    def __init__(self, problem: MapProblem, design: Design, rows: Mask) -> None:
         self.problem, self.design, self.rows = problem, design, rows
         self.nominal = np.array([free.nominal for free in problem.free])
         self.scale = np.array([free.scale for free in problem.free])
@@ -467,7 +467,7 @@ class _Geometry:
         return max(math.sqrt(float(rest @ rest) / freedom), self.least)
 
 
-def _check_identified(problem: Problem, result: Estimate) -> None:
+def _check_identified(problem: MapProblem, result: Estimate) -> None:
     """Refuse a geometry that neither the data nor a tolerance determines."""
     names = (*result.design.names, *(free.name for free in problem.free))
     priors = np.diag(result.sigma * problem.information(result.design))
@@ -482,7 +482,7 @@ def _check_identified(problem: Problem, result: Estimate) -> None:
         )
 
 
-def refitted(problem: Problem, result: Estimate, rows: Mask, gone: int) -> Estimate:
+def refitted(problem: MapProblem, result: Estimate, rows: Mask, gone: int) -> Estimate:
     """The fit without one level; the search of the geometry starts from ``result``.
 
     Raises

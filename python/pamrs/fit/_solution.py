@@ -18,7 +18,7 @@ from pamrs.fit._cautions import cautions
 from pamrs.fit._checks import check_rest_length
 from pamrs.fit._data import ForceMap
 from pamrs.fit._design import template
-from pamrs.fit._estimate import Estimate, Free, Known, Problem, estimate
+from pamrs.fit._estimate import Estimate, Free, Known, MapProblem, estimate
 from pamrs.fit._result import MuscleFit
 from pamrs.fit._statistics import FitParameter
 from pamrs.fit._validation import WEAK, level_forces
@@ -252,11 +252,11 @@ def _problem(
     known: Mapping[str, Known],
     noise: float | None,
     direction: str | None,
-) -> Problem:
+) -> MapProblem:
     used = data.used
     pressure, _, force, level, way = data.used_rows()
     steps = way.astype(np.float64) if direction == "data" else np.zeros(len(force))
-    return Problem(
+    return MapProblem(
         blank=blank,
         moduli=moduli,
         free=free,
@@ -272,7 +272,7 @@ def _problem(
     )
 
 
-def _weighted(problem: Problem, rows: Mask) -> Problem:
+def _weighted(problem: MapProblem, rows: Mask) -> MapProblem:
     """The problem with every fitted residual over the largest force of its level."""
     tops = level_forces(problem)
     weak = tops < WEAK * float(problem.force.max())
@@ -291,7 +291,7 @@ def _weighted(problem: Problem, rows: Mask) -> Problem:
 
 
 def _result(
-    data: ForceMap, problem: Problem, rows: Mask, found: Estimate, errors: str
+    data: ForceMap, problem: MapProblem, rows: Mask, found: Estimate, errors: str
 ) -> MuscleFit:
     plain, robust = covariances(problem, found, problem.level[rows])
     warnings = []
@@ -329,7 +329,7 @@ def _result(
 
 
 def _parameters(
-    problem: Problem, found: Estimate, covar: Array, plain: Array
+    problem: MapProblem, found: Estimate, covar: Array, plain: Array
 ) -> dict[str, FitParameter]:
     spread, spread_plain = np.sqrt(np.diag(covar)).tolist(), np.sqrt(np.diag(plain)).tolist()
     parameters = {}
@@ -358,12 +358,12 @@ def levels_needed(unknowns: int) -> int:
     return max(_FEWEST_LEVELS, unknowns + 1)
 
 
-def covariances(problem: Problem, result: Estimate, level: Index) -> tuple[Array, Array | None]:
+def covariances(problem: MapProblem, result: Estimate, level: Index) -> tuple[Array, Array | None]:
     """Plain and level-robust covariance of coefficients and geometry.
 
     Parameters
     ----------
-    problem : Problem
+    problem : MapProblem
         Data and unknowns.
     result : Estimate
         The fit.

@@ -9,7 +9,7 @@ import numpy as np
 
 from pamrs._arrays import Array, Mask
 from pamrs.fit._data import ForceMap
-from pamrs.fit._estimate import Estimate, Free, Problem
+from pamrs.fit._estimate import Estimate, Free, MapProblem
 from pamrs.rig import Muscle
 
 
@@ -77,7 +77,7 @@ class FitStatistics:
     success: bool
     message: str
     warnings: tuple[str, ...]
-    _problem: Problem = field(repr=False)
+    _problem: MapProblem = field(repr=False)
     _estimate: Estimate = field(repr=False)
     _rows: Mask = field(repr=False)
 

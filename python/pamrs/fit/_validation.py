@@ -9,7 +9,7 @@ import numpy as np
 
 from pamrs._arrays import Array, Index, Mask
 from pamrs.errors import FitError
-from pamrs.fit._estimate import Estimate, Problem, refitted
+from pamrs.fit._estimate import Estimate, MapProblem, refitted
 
 #: Share of the map's largest force below which a level's own largest force is no scale for its
 #: errors.
@@ -63,7 +63,7 @@ class PressureErrors:
         return f"PressureErrors({len(self.levels)} levels{left}{worst})"
 
     @classmethod
-    def of(cls, problem: Problem, error: Array, rows: Mask, fitted: Mask) -> PressureErrors:
+    def of(cls, problem: MapProblem, error: Array, rows: Mask, fitted: Mask) -> PressureErrors:
         """Gather force errors [N] of all rows (n,) over the levels present in ``rows``."""
         everything = np.unique(problem.level[rows])
         tops = level_forces(problem)
@@ -80,7 +80,7 @@ class PressureErrors:
         )
 
 
-def level_forces(problem: Problem) -> Array:
+def level_forces(problem: MapProblem) -> Array:
     """Largest measured force of every level [N]; zero or negative where a level does not pull."""
     return np.array(
         [problem.force[problem.level == level].max() for level in range(len(problem.levels))]
@@ -154,7 +154,7 @@ class CrossValidation:
         }
 
 
-def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValidation:
+def leave_one_out(problem: MapProblem, result: Estimate, rows: Mask) -> CrossValidation:
     """Predict each fitted level from the others.
 
     Without free geometry and priors the refits follow from the one decomposition: the prediction
@@ -163,7 +163,7 @@ def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValida
 
     Parameters
     ----------
-    problem : Problem
+    problem : MapProblem
         Data and unknowns.
     result : Estimate
         The fit of all rows.
@@ -205,14 +205,14 @@ def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValida
     )
 
 
-def _gone(problem: Problem, level: int, why: str) -> FitError:
+def _gone(problem: MapProblem, level: int, why: str) -> FitError:
     return FitError(
         f"without {problem.levels[level] / 1e3:g} kPa the other levels do not determine the fit: "
         f"{why}"
     )
 
 
-def _by_hat_matrix(problem: Problem, result: Estimate, level: Index) -> Array:
+def _by_hat_matrix(problem: MapProblem, result: Estimate, level: Index) -> Array:
     if not result.jacobian.shape[1]:
         return result.residual
     scaled = result.jacobian / np.linalg.norm(result.jacobian, axis=0)
@@ -230,7 +230,7 @@ def _by_hat_matrix(problem: Problem, result: Estimate, level: Index) -> Array:
     return error
 
 
-def _by_refits(problem: Problem, result: Estimate, rows: Mask) -> Array:
+def _by_refits(problem: MapProblem, result: Estimate, rows: Mask) -> Array:
     error = np.zeros(len(rows))
     for group in np.unique(problem.level[rows]):
         try:

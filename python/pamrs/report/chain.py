@@ -67,7 +67,7 @@ ELSEWHERE = {
 
 
 @dataclass(eq=False)
-class _Part:
+class _DrawnBlock:
     """A block of the rig in the drawing.
 
     Attributes
@@ -173,7 +173,7 @@ def draw_chain(axes: Axes, diagnosis: Findings) -> None:
     axes.set_aspect("equal")
 
 
-def _marked(rig: Rig, diagnosis: Findings) -> dict[str, _Part]:
+def _marked(rig: Rig, diagnosis: Findings) -> dict[str, _DrawnBlock]:
     """The blocks that are drawn, in their places, with what was found."""
     parts = _parts(rig)
     _place(parts, rig)
@@ -193,12 +193,12 @@ def _title(rig: Rig, kind: str, name: str) -> str:
     return f"{own} {label(name)}".strip()
 
 
-def _parts(rig: Rig) -> dict[str, _Part]:
+def _parts(rig: Rig) -> dict[str, _DrawnBlock]:
     """The blocks that are drawn, each with those that lead to it."""
     parts = {}
     for kind in KINDS:
         for name in rig.tables(kind):
-            part = _Part(kind, name, _title(rig, kind, name))
+            part = _DrawnBlock(kind, name, _title(rig, kind, name))
             parts[part.full] = part
     links = [
         pair
@@ -220,10 +220,10 @@ def _parts(rig: Rig) -> dict[str, _Part]:
     return parts
 
 
-def _place(parts: dict[str, _Part], rig: Rig) -> None:
+def _place(parts: dict[str, _DrawnBlock], rig: Rig) -> None:
     """Columns by the way from the supply, rows so that what belongs together is level."""
 
-    def depth(part: _Part, seen: tuple[str, ...] = ()) -> int:
+    def depth(part: _DrawnBlock, seen: tuple[str, ...] = ()) -> int:
         before = [parts[a] for a in part.after if a not in seen]
         return 1 + max((depth(p, (*seen, part.full)) for p in before), default=-1)
 
@@ -251,7 +251,7 @@ def _middle(rows: list[float], otherwise: float) -> float:
     return sum(rows) / len(rows) if rows else otherwise
 
 
-def _mark(parts: dict[str, _Part], diagnosis: Findings) -> None:
+def _mark(parts: dict[str, _DrawnBlock], diagnosis: Findings) -> None:
     """Mark the blocks in which something was found, with what was found."""
     answer = diagnosis.answer
     open_ = {n for p in answer.parts for n in p.names if not p.sure or answer.missed}
@@ -270,7 +270,7 @@ def _mark(parts: dict[str, _Part], diagnosis: Findings) -> None:
             part.found.append(doubt + label(key))
 
 
-def _at(parts: dict[str, _Part], kind: str, name: str) -> list[_Part]:
+def _at(parts: dict[str, _DrawnBlock], kind: str, name: str) -> list[_DrawnBlock]:
     """Boxes of a block; of the nearest one that is drawn where it has none."""
     for own in (kind, *ELSEWHERE.get(kind, ())):
         found = [p for p in parts.values() if p.kind == own]
@@ -283,7 +283,7 @@ def _at(parts: dict[str, _Part], kind: str, name: str) -> list[_Part]:
 class _Drawing:
     """Boxes and frames with their texts, on a canvas that grows with them."""
 
-    parts: dict[str, _Part]
+    parts: dict[str, _DrawnBlock]
     diagnosis: Findings
     rig: Rig
 
@@ -321,7 +321,7 @@ class _Drawing:
         located = self.diagnosis.answer.block
         return f"The rig: {names}." + (f" The mismatch is in {located}." if located else "")
 
-    def _lines(self, part: _Part) -> list[tuple[str, str]]:
+    def _lines(self, part: _DrawnBlock) -> list[tuple[str, str]]:
         """Text lines of a box with their kind: ``measured``, ``unmeasured`` or ``found``."""
         out = []
         for channel in CHANNELS[part.kind]:

@@ -31,7 +31,7 @@ from pamrs.report.text import (
 __all__ = [
     "COLOURS",
     "STYLE",
-    "Line",
+    "PlotLine",
     "Panel",
     "curves",
     "draw_panel",
@@ -116,7 +116,7 @@ def _has(values: Array | None, besides: Array | None = None) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class PlotLine:
     """A curve of a panel: its name, colour, points in the unit of the panel, width and dashes."""
 
     name: str
@@ -135,7 +135,7 @@ class Panel:
     ----------
     title : str
         The quantity with its unit.
-    lines : list of Line
+    lines : list of PlotLine
         The curves, the first one below.
     noise : float
         Half the height of the band of noise; 0 for none.
@@ -144,7 +144,7 @@ class Panel:
     """
 
     title: str
-    lines: list[Line]
+    lines: list[PlotLine]
     noise: float = 0.0
     spans: Sequence[Sequence[float]] = ()
 
@@ -181,11 +181,11 @@ def _quantity(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def _line(name: str, stage: str, time: Array, values: Array, **how: Any) -> Line:
-    return Line(name, COLOURS[stage], *decimate(time, values), **how)
+def _line(name: str, stage: str, time: Array, values: Array, **how: Any) -> PlotLine:
+    return PlotLine(name, COLOURS[stage], *decimate(time, values), **how)
 
 
-def _compared(trace: Trace, factor: float) -> list[Line]:
+def _compared(trace: Trace, factor: float) -> list[PlotLine]:
     """Curves of the measurement, and of the model of the rig file."""
     measured = _line("measured", "measured", trace.time, trace.measured * factor, width=2.6)
     return [measured, _line("your model", "before", trace.time, trace.before * factor)]
@@ -420,7 +420,7 @@ def separating_panels(own: Curves) -> list[Panel]:
         unit, factor = display_unit(own.unit, _largest(*values.values()))
         # the leading one is broad, the others are dashed over it: they often lie on it
         lines = [
-            Line(
+            PlotLine(
                 hypothesis_label(name),
                 colours[name],
                 *decimate(np.asarray(time), factor * np.asarray(curve, dtype=np.float64)),

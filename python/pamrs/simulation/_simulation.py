@@ -157,7 +157,7 @@ class Balance:
         )
 
 
-class _Told(NamedTuple):
+class _TimedCondition(NamedTuple):
     """Condition of a block that begins and ends at times, as the recorded channels show."""
 
     block: str
@@ -206,7 +206,7 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         seen = [event for own in self._happenings() for event in own.events()]
         return sorted([*self._happened, *seen], key=lambda event: event.time)
 
-    def _clipped(self) -> list[_Told]:
+    def _clipped(self) -> list[_TimedCondition]:
         """Commands beyond their valve's range, an entry for each valve, perhaps without times."""
         found = []
         for name, command in self.under("valve_command").items():
@@ -217,10 +217,12 @@ class Simulation(View, Tabular, Mapping[str, Array]):
             worst = float(held[np.argmax(np.abs(held - null))])
             what = f"command clipped to its range of {null - half:.4g} to {null + half:.4g} V"
             kinds, more = ("command_clipped", "command_in_range"), f"{worst:.4g} V was asked for"
-            found.append(_Told(dotted("valve", name), kinds, self._turns(beyond), what, more))
+            found.append(
+                _TimedCondition(dotted("valve", name), kinds, self._turns(beyond), what, more)
+            )
         return found
 
-    def _happenings(self) -> list[_Told]:
+    def _happenings(self) -> list[_TimedCondition]:
         """Conditions that the recorded channels show: clipped commands, muscles that push."""
         return [told for told in (*self._clipped(), *self._pushed()) if told.times]
 
@@ -228,7 +230,7 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         """Times from which something holds and from which it no longer does, in turn [s]."""
         return [float(time) for time in self.time[np.flatnonzero(np.diff(of, prepend=False))]]
 
-    def _pushed(self) -> list[_Told]:
+    def _pushed(self) -> list[_TimedCondition]:
         """Muscles that push, an entry for each that can, perhaps without times."""
         found = []
         for name, muscle in self.rig.tables("muscle").items():
@@ -239,7 +241,7 @@ class Simulation(View, Tabular, Mapping[str, Array]):
             times = self._turns(each < -min(_TELLING_PUSH, 0.5 * load))
             what = f"pushes, each muscle with up to {-float(each.min()):.4g} N,"
             kinds, more = ("muscle_pushes", "push_ends"), f"its buckling_load is {load:.4g} N"
-            found.append(_Told(dotted("muscle", name), kinds, times, what, more))
+            found.append(_TimedCondition(dotted("muscle", name), kinds, times, what, more))
         return found
 
     @property

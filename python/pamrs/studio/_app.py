@@ -39,7 +39,7 @@ from pamrs._views import decimate
 from pamrs.channels import laboratory_unit
 from pamrs.errors import PamrsError, ParameterError
 from pamrs.report.page import render_page
-from pamrs.studio._folder import Studio, Table
+from pamrs.studio._folder import LogTable, Studio
 from pamrs.studio._run import FILES
 
 _OWN: Final = (
@@ -292,7 +292,7 @@ def page(studio: Studio, token: str) -> str:
     )
 
 
-def _log(table: Table) -> dict[str, Any]:
+def _log(table: LogTable) -> dict[str, Any]:
     """A log: its columns with curves, what is proposed, what to look at."""
     item, first = table.item, table.entries[0]
     rows = []

@@ -39,7 +39,7 @@ _MOST_LOGS: Final = 100
 
 
 @dataclass(frozen=True)
-class Table:
+class LogTable:
     """A log on the page: what is proposed for it, and the entries of case.toml that say so.
 
     Attributes
@@ -106,7 +106,7 @@ class Studio:
         self.checked: Check | None = None
         self.run: Run | None = None
         self.lock = threading.RLock()
-        self._tables: list[Table] | None = None
+        self._tables: list[LogTable] | None = None
         self._unread = ""
         self._read: dict[Path, tuple[object, list[LogProposal]]] = {}
         self._left_out: set[tuple[str, str]] = set()
@@ -210,7 +210,7 @@ class Studio:
         """Forget the check and the proposals after a change."""
         self.checked = self._tables = None
 
-    def tables(self) -> tuple[list[Table], str]:
+    def tables(self) -> tuple[list[LogTable], str]:
         """Entries proposed or confirmed for each log, and the errors of unreadable logs."""
         if self._tables is None:
             items, failed = list[LogProposal](), list[str]()
@@ -232,7 +232,7 @@ class Studio:
             self._read[log] = (key, propose([log], self.rig()[0]).logs)
         return self._read[log][1]
 
-    def _tables_of(self, items: list[LogProposal]) -> list[Table]:
+    def _tables_of(self, items: list[LogProposal]) -> list[LogTable]:
         said = Proposal(items).case_toml(self.folder) if any(i.matches for i in items) else ""
         confirmed = self.text("case.toml")
         known = _by_log(confirmed) if confirmed.startswith(_HEAD) else {}
@@ -245,7 +245,7 @@ class Studio:
             entries = known.get(key) or [bare | ({"time": item.time} if item.time else {})]
             if key in self._left_out:
                 entries = [entry | {"role": ""} for entry in entries]
-            made.append(Table(item, entries))
+            made.append(LogTable(item, entries))
         return made
 
     def take(self, log: Path) -> None:
@@ -419,7 +419,7 @@ def _inline(value: Any) -> Any:
     return made
 
 
-def _entries(table: Table, given: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+def _entries(table: LogTable, given: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """The entries of case.toml for a log, as the user wants them."""
     role, file = given.get("role"), table.key[0]
     if role not in table.roles:
@@ -448,7 +448,7 @@ def _entries(table: Table, given: Mapping[str, Any]) -> Iterator[dict[str, Any]]
     yield made | {"role": role, "channels": channels}
 
 
-def _chosen(table: Table, columns: Mapping[str, Any]) -> dict[str, Any]:
+def _chosen(table: LogTable, columns: Mapping[str, Any]) -> dict[str, Any]:
     """The channels of a log; what was proposed with a column and left alone stays whole."""
     made: dict[str, Any] = {}
     clocks = [entry["time"] for entry in table.entries[0]["channels"].values() if "time" in entry]

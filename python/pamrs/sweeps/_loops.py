@@ -38,7 +38,7 @@ _UNITS: Final = {
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedLoop(Drive):
+class SweptLoop(Drive):
     """A controller and what it follows.
 
     Attributes
@@ -174,5 +174,5 @@ def gain_map(
     loop: dict[str, Any] = {k: float(v) for k, v in given.items() if v is not None}
     loop |= {"initial": {k: float(v) for k, v in initial.items()}} if initial else {}
     hangs = any(load.get("kind", "mass") == "mass" for load in rig.tables("load").values())
-    drive = ClosedLoop(controller, trajectory, loop, by_length=hangs)
+    drive = SweptLoop(controller, trajectory, loop, by_length=hangs)
     return run_plan(rig, Axes.of(over, samples), drive, store=store, **runs)

@@ -22,7 +22,7 @@ _FEWEST, _MOST, _PARTS = 1024, 65_536, 64
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class SweepPlan:
     """Runs of a sweep, and how they are cut into chunks.
 
     Attributes
@@ -45,7 +45,7 @@ class Plan:
     chunk: int
 
     @classmethod
-    def of(cls, rig: Rig, axes: Axes, drive: Drive, chunk: int | None) -> Plan:
+    def of(cls, rig: Rig, axes: Axes, drive: Drive, chunk: int | None) -> SweepPlan:
         """A plan; by default some 64 chunks, of 1024 to 65 536 runs."""
         size = min(max(len(axes) // _PARTS, _FEWEST), _MOST) if chunk is None else chunk
         return cls(rig.to_toml_text(comments=False), rig.name, axes, drive, size)
@@ -97,7 +97,7 @@ def differences(stored: dict[str, Any], wanted: dict[str, Any]) -> list[str]:
     Parameters
     ----------
     stored, wanted : dict
-        :attr:`Plan.content`.
+        :attr:`SweepPlan.content`.
 
     Returns
     -------

@@ -22,7 +22,7 @@ import numpy as np
 from pamrs._arrays import Array
 from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError, joined, missing_package
-from pamrs.sweeps._plan import Plan, differences
+from pamrs.sweeps._plan import SweepPlan, differences
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +35,7 @@ ENDED_AT: Final = "ended_at"
 _FOLDER, _PLAN, _JOURNAL, _LOCK = ".pamrs", "plan.json", "journal", "lock"
 
 
-class Entry(NamedTuple):
+class StoredChunk(NamedTuple):
     """A chunk that is done.
 
     Attributes
@@ -59,7 +59,7 @@ class Entry(NamedTuple):
         return b"%08x %s\n" % (zlib.crc32(text), text)
 
     @classmethod
-    def read(cls, line: bytes) -> Entry | None:
+    def read(cls, line: bytes) -> StoredChunk | None:
         """Read a line of the journal; None where it was not written to its end."""
         sum_, _, text = line.rstrip(b"\n").partition(b" ")
         if not line.endswith(b"\n") or sum_ != b"%08x" % zlib.crc32(text):
@@ -68,7 +68,7 @@ class Entry(NamedTuple):
         return cls(chunk, runs, ended, tuple(first) if first else None)
 
 
-def read_journal(path: Path) -> tuple[dict[int, Entry], int]:
+def read_journal(path: Path) -> tuple[dict[int, StoredChunk], int]:
     """The chunks that are done, and how many bytes of the journal say so.
 
     Parameters
@@ -78,15 +78,15 @@ def read_journal(path: Path) -> tuple[dict[int, Entry], int]:
 
     Returns
     -------
-    entries : dict of int to Entry
+    entries : dict of int to StoredChunk
     size : int
         What stands behind it was being written when a process was killed.
     """
-    entries: dict[int, Entry] = {}
+    entries: dict[int, StoredChunk] = {}
     size = 0
     with path.open("rb") as stream:
         for line in stream:
-            entry = Entry.read(line)
+            entry = StoredChunk.read(line)
             if entry is None:
                 break
             entries[entry.chunk] = entry
@@ -101,7 +101,7 @@ class Store:
     ----------
     path : path-like
         Folder of the Zarr group; made where there is none.
-    plan : Plan
+    plan : SweepPlan
         What is run.
     rig : Rig
         Its rig, for units.
@@ -115,7 +115,7 @@ class Store:
         If zarr is not installed.
     """
 
-    def __init__(self, path: str | os.PathLike[str], plan: Plan, rig: Rig) -> None:
+    def __init__(self, path: str | os.PathLike[str], plan: SweepPlan, rig: Rig) -> None:
         self.path, self.plan = Path(path), plan
         _zarr()
         if not os.path.lexists(self.path):
@@ -127,7 +127,7 @@ class Store:
                 name: group[name].with_config({"write_empty_chunks": True})
                 for name in self._names()
             }
-        self.entries: dict[int, Entry] = {}
+        self.entries: dict[int, StoredChunk] = {}
         self._journal: Any = None
 
     def __enter__(self) -> Store:
@@ -148,7 +148,7 @@ class Store:
         """Chunks that are not done, in order."""
         return (chunk for chunk in range(len(self.plan.blocks)) if chunk not in self.entries)
 
-    def write(self, chunk: int, values: Mapping[str, Array], done: Done) -> Entry:
+    def write(self, chunk: int, values: Mapping[str, Array], done: Done) -> StoredChunk:
         """Keep a chunk: its arrays go to the disk first, then its line to the journal."""
         blocks, axes = self.plan.blocks, self.plan.axes
         region, (start, stop) = blocks.region(chunk), blocks.runs(chunk)
@@ -165,7 +165,7 @@ class Store:
             _to_disk(file)
         first = None if done.first is None else (start + done.first[0], done.first[1])
         ended = int(np.isfinite(done.ended_at).sum())
-        entry = Entry(chunk, stop - start, ended, first)
+        entry = StoredChunk(chunk, stop - start, ended, first)
         self._journal.write(entry.line())
         os.fsync(self._journal.fileno())
         self.entries[chunk] = entry

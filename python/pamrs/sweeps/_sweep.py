@@ -14,7 +14,7 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig, check_sample_time
 from pamrs.sweeps._axes import INITIAL, Axes
 from pamrs.sweeps._drives import Drive, OpenLoop, metric_of, run_chunk
-from pamrs.sweeps._plan import Plan
+from pamrs.sweeps._plan import SweepPlan
 from pamrs.sweeps._running import Progress, executor_of, in_flight_of, run_missing
 from pamrs.sweeps._store import ENDED_AT, Store, open_sweep
 
@@ -179,7 +179,7 @@ def run_plan(
     most = in_flight_of(workers) if in_flight is None else whole("in_flight", in_flight, 1)
     if workers is not None and threads is None:
         threads = 1
-    plan = Plan.of(rig, axes, drive, chunk)
+    plan = SweepPlan.of(rig, axes, drive, chunk)
     first = plan.task(0, 1)  # tried before there is a store, for arguments that are not allowed
     run_chunk(replace(first, values={name: own[:1] for name, own in first.values.items()}))
     with Store(store, plan, rig) as kept:

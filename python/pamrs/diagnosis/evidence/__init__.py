@@ -1,6 +1,6 @@
 """Hypotheses, what speaks for each, and the verdict of each group of blocks.
 
-Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_out`,
+Public: `FittedHypothesis`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_out`,
 `autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
 `BlockLikelihood` (how probable recordings are);
 `weigh`, `explains`, `is_absent`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
@@ -14,7 +14,7 @@ from __future__ import annotations
 from pamrs.diagnosis.evidence._candidates import (
     Attempts,
     BlockGroup,
-    Candidate,
+    FittedHypothesis,
     autocorrelation_of,
     misses_only_held_out,
     parts_of,
@@ -22,13 +22,13 @@ from pamrs.diagnosis.evidence._candidates import (
     start_of,
     without_autocorrelation,
 )
-from pamrs.diagnosis.evidence._determined import (
+from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
+from pamrs.diagnosis.evidence._undetermined import (
     drop_undetermined,
     is_outside,
     put_aside,
     with_stated_std,
 )
-from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
 from pamrs.diagnosis.evidence._verdicts import (
     SHARED_ODDS,
     WALL_TOLERANCES,
@@ -60,7 +60,7 @@ __all__ = [
     "FORM_SHARE_ALIKE",
     "Attempts",
     "BlockLikelihood",
-    "Candidate",
+    "FittedHypothesis",
     "BlockGroup",
     "Judged",
     "Weighing",

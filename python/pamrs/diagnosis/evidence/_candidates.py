@@ -73,7 +73,7 @@ Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class FittedHypothesis:
     """A fitted hypothesis: effects, and values of the rig file that are wrong.
 
     Attributes
@@ -155,7 +155,7 @@ class BlockGroup:
         Gas blocks (supply, chamber) or the arm.
     nominal, baseline : dict of str to Excess
         Excess by block before and after the refit, on fitted recordings.
-    candidates : list of Candidate
+    candidates : list of FittedHypothesis
         The baseline first, then every set of effects tried.
     probabilities : dict of Hypothesis to float
         Over those that were fitted, `UNLISTED` and `UNDECIDED` (nothing missing here, or parameters
@@ -166,7 +166,7 @@ class BlockGroup:
         Noise levels.
     suspects : list of Block
         Blocks that keep an excess.
-    closure : Candidate or None
+    closure : FittedHypothesis or None
         Where no name is likely: a form of what is missing that predicts held-out recordings better
         than the baseline.
     sought : bool
@@ -178,17 +178,17 @@ class BlockGroup:
     blocks: list[Block]
     nominal: dict[str, Excess]
     baseline: dict[str, Excess]
-    candidates: list[Candidate]
+    candidates: list[FittedHypothesis]
     probabilities: dict[Hypothesis, float]
     mismatch: Block | None
     noise_level: dict[Key, NoiseLevel]
     suspects: list[Block]
-    closure: Candidate | None = None
+    closure: FittedHypothesis | None = None
     sought: bool = False
     predicted_gain: dict[Term, float] = field(default_factory=dict)
 
     @property
-    def best(self) -> Candidate:
+    def best(self) -> FittedHypothesis:
         """The most probable hypothesis (the baseline when none is)."""
         named = [c for c in self.candidates if c.terms]
         if self.mismatch is None or not named:
@@ -196,9 +196,9 @@ class BlockGroup:
         return max(named, key=lambda c: self.probabilities.get(c.hypothesis, 0.0))
 
 
-def significant(found: Excess, ratio: float = 1.0) -> bool:
+def significant(excess_of_block: Excess, ratio: float = 1.0) -> bool:
     """True where a residual's variance is above its limit and so many times that of the noise."""
-    return found.ratio > max(ratio, found.limit)
+    return excess_of_block.ratio > max(ratio, excess_of_block.limit)
 
 
 def misses_only_held_out(
@@ -219,7 +219,7 @@ class Attempts:
     outer: Problem
     nominal: Rig
     noise_level: dict[Key, NoiseLevel]
-    out: dict[str, Excess]
+    held_out: dict[str, Excess]
     suspects: list[Block]
 
     @property
@@ -254,27 +254,27 @@ class Attempts:
         self, inside: Mapping[Key, Residual], outside: Mapping[Key, Residual]
     ) -> Callable[[], Mapping[str, BlockLikelihood]]:
         """Likelihood of a hypothesis's residuals by block, worked out when it is asked for."""
-        found = inside if self.same else {**inside, **outside}
-        return cache(partial(self.likelihood.of, found))
+        residuals_of_all = inside if self.same else {**inside, **outside}
+        return cache(partial(self.likelihood.of, residuals_of_all))
 
     @property
     def same(self) -> bool:
         """True where no recording is held out."""
         return self.outer.recordings is self.inner.recordings
 
-    def autocorrelation(self, found: Fit) -> Weights:
+    def autocorrelation(self, fitted: Fit) -> Weights:
         """Weights of the autocorrelation that a fit leaves, and at the least that of the noise."""
-        return autocorrelation_of(self.inner, found, self.noise_level)
+        return autocorrelation_of(self.inner, fitted, self.noise_level)
 
-    def start_of(self, found: Fit, effect: Term) -> Start:
+    def start_of(self, fitted: Fit, effect: Term) -> Start:
         """Start of another fit from an effect as it was fitted."""
-        return start_of(found, effect, LEAST_START)
+        return start_of(fitted, effect, LEAST_START)
 
-    def starts_of(self, candidate: Candidate) -> list[Start]:
+    def starts_of(self, candidate: FittedHypothesis) -> list[Start]:
         """Starts of another fit from each effect of a candidate."""
         return [self.start_of(candidate.fit, effect) for effect in candidate.effects]
 
-    def fit_events(self, effect: Term, beside: Candidate) -> Candidate | None:
+    def fit_events(self, effect: Term, beside: FittedHypothesis) -> FittedHypothesis | None:
         """Fit an effect with times of its own in every recording, next to a candidate's effects."""
         if effect.id in {e.id for e in beside.effects}:
             return None  # it would replace what it is to happen beside
@@ -285,93 +285,95 @@ class Attempts:
             return None  # it would take too long
         return self._attempt((*beside.terms, effect), lambda: self._fit_events(effect, beside))
 
-    def _fit_events(self, effect: Term, beside: Candidate) -> Candidate | None:
+    def _fit_events(self, effect: Term, beside: FittedHypothesis) -> FittedHypothesis | None:
         white = self.white
         model = with_effects_of(self.nominal, beside.fit.rig, self.held)
-        found = fit_events(effect, self.inner, model, beside.fit, white)
-        if found is None:
+        fitted = fit_events(effect, self.inner, model, beside.fit, white)
+        if fitted is None:
             return None
         if beside.effects:
-            found = self._refit_around_events(found, beside, white)
+            fitted = self._refit_around_events(fitted, beside, white)
         effects = (*beside.effects, effect)
         if self.same:
-            return self.judge(effects, found)
-        bare = without_term(found.rig, effect)
+            return self.judge(effects, fitted)
+        bare = without_term(fitted.rig, effect)
         quiet = residuals(self.outer, bare)
-        form = found.events.form if found.events else ""
-        known = {n: found.values[f"{effect}.{n}"] for n in effect.info.form(form).shared}
+        form = fitted.events.form if fitted.events else ""
+        known = {n: fitted.values[f"{effect}.{n}"] for n in effect.info.form(form).shared}
         events = look_for_events(effect, self.outer, bare, quiet, white, known, form)
         if events is None:
-            return self.judge(effects, found, quiet)
+            return self.judge(effects, fitted, quiet)
         everywhere = replace(
-            found,
+            fitted,
             events=replace(
                 events,
-                values=found.events.values | events.values if found.events else events.values,
+                values=fitted.events.values | events.values if fitted.events else events.values,
             ),
         )
         return self.judge(effects, everywhere, residuals(self.outer, bare, events=events))
 
     def _refit_around_events(
-        self, found: Fit, beside: Candidate, autocorrelation: dict[str, float]
+        self, fitted: Fit, beside: FittedHypothesis, autocorrelation: dict[str, float]
     ) -> Fit:
         """Refit the persistent effects of a candidate while the events are held."""
-        assert found.events is not None
-        effect = found.events.effect
+        assert fitted.events is not None
+        effect = fitted.events.effect
         warm = replace(
-            beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved}
+            beside.fit, values=beside.fit.values | {n: fitted.values[n] for n in beside.fit.moved}
         )
         again = self._fit(
             self.starts_of(beside),
             autocorrelation,
             warm,
-            events=found.events,
+            events=fitted.events,
             evaluations=_EVALUATIONS_BESIDE,
         )
-        names = [n for n in found.values if effect_of(n) == effect]
+        names = [n for n in fitted.values if effect_of(n) == effect]
         return replace(
             again,
             effects=(*beside.effects, effect),
-            rig=found.events.put_into(again.rig, next(iter(found.events.values))),
-            values=again.values | {n: found.values[n] for n in names},
-            std=again.std | {n: found.std[n] for n in names},
+            rig=fitted.events.put_into(again.rig, next(iter(fitted.events.values))),
+            values=again.values | {n: fitted.values[n] for n in names},
+            std=again.std | {n: fitted.std[n] for n in names},
         )
 
-    def excess(self, block: Block, problem: Problem, found: dict[Key, Residual]) -> Excess:
+    def excess(
+        self, block: Block, problem: Problem, block_residuals: dict[Key, Residual]
+    ) -> Excess:
         """Excess over the noise of a block's residual in the recordings of a problem."""
-        return excess(block, problem.recordings, found, self.noise_level, self.settings)
+        return excess(block, problem.recordings, block_residuals, self.noise_level, self.settings)
 
     def judge(
-        self, effects: tuple[Term, ...], found: Fit, outside: dict[Key, Residual] | None = None
-    ) -> Candidate:
+        self, effects: tuple[Term, ...], fitted: Fit, outside: dict[Key, Residual] | None = None
+    ) -> FittedHypothesis:
         """Judge a fit on held-out recordings, or on each recording as the others predict it."""
         blocks = self.inner.blocks
-        inside = {b.name: self.excess(b, self.inner, found.residuals) for b in blocks}
+        inside = {b.name: self.excess(b, self.inner, fitted.residuals) for b in blocks}
         if outside is None:
             outside = (
-                predicted_by_others(self.inner, found, self.autocorrelation(found))
+                predicted_by_others(self.inner, fitted, self.autocorrelation(fitted))
                 if self.same
-                else residuals(self.outer, found.rig)
+                else residuals(self.outer, fitted.rig)
             )
         after = {b.name: self.excess(b, self.outer, outside) for b in blocks}
-        if found.events is None and misses_only_held_out(inside, after, same=self.same):
-            outside = predicted_with_doubt(self.outer, found)
+        if fitted.events is None and misses_only_held_out(inside, after, same=self.same):
+            outside = predicted_with_doubt(self.outer, fitted)
             after = {b.name: self.excess(b, self.outer, outside) for b in blocks}
         gaps = [
-            (self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0))
+            (self.held_out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0))
             for b in self.suspects
         ]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
-        return Candidate(
+        return FittedHypothesis(
             effects,
-            found,
+            fitted,
             after,
             inside,
             gap,
-            scattered=cache(partial(_scatter, effects, self.inner, found)),
+            scattered=cache(partial(_scatter, effects, self.inner, fitted)),
             places=sum(math.log(len(self.terms_of(e.id))) for e in effects),
-            likelihood=self.likelihood_of(found.residuals, outside),
+            likelihood=self.likelihood_of(fitted.residuals, outside),
         )
 
     def terms_of(self, effect: str) -> list[Term]:
@@ -381,7 +383,7 @@ class Attempts:
 
     def fit_effects(
         self, starts: list[Start], warm: Fit, autocorrelation: dict[str, float]
-    ) -> Candidate | None:
+    ) -> FittedHypothesis | None:
         """Fit effects from one start each, residuals weighted by their own autocorrelation; None
         where the model cannot be run.
         """
@@ -391,7 +393,7 @@ class Attempts:
         settings, sealed = self.settings, self.nominal.model["valve"] is None
         limit = _SEALED_EVALUATIONS if sealed else settings.effect_evaluations
 
-        def found() -> Candidate:
+        def fit_and_judge() -> FittedHypothesis:
             best = self._fit(starts, autocorrelation, warm, evaluations=limit)
             weights = self.autocorrelation(best)
             if weights.largest > CORRELATED_VARIANCE:
@@ -399,11 +401,11 @@ class Attempts:
                 best = self._fit(again, weights, best, evaluations=limit)
             return self.judge(effects, best)
 
-        return self._attempt(effects, found)
+        return self._attempt(effects, fit_and_judge)
 
     def fit_shortly(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
-    ) -> Candidate | None:
+    ) -> FittedHypothesis | None:
         """Fit effects and freed parameters in a few steps: enough to see which of many sets are
         worth a whole fit; None where the model cannot be run.
         """
@@ -411,11 +413,11 @@ class Attempts:
         if not self.held.isdisjoint(e.id for e in effects):
             return None
 
-        def found() -> Candidate:
+        def fit_and_judge() -> FittedHypothesis:
             short = self._fit(starts, self.white, warm, wrong=wrong, evaluations=_FIRST_EVALUATIONS)
             return replace(self.judge(effects, short), wrong=wrong)
 
-        return self._attempt((*effects, *wrong), found)
+        return self._attempt((*effects, *wrong), fit_and_judge)
 
     def _attempt(self, terms: Iterable[object], work: Callable[[], Found]) -> Found | None:
         """Run an attempt at a hypothesis; None where it leaves the model's range or fails."""
@@ -443,7 +445,7 @@ class Attempts:
         some parameters freed; the rest as in :func:`pamrs.diagnosis.fit.fit`.
         """
         free, held, forms = parts_of(starts)
-        found = fit(
+        fitted = fit(
             self.inner,
             self.nominal,
             tuple(start.effect for start in starts),
@@ -457,9 +459,9 @@ class Attempts:
             freed=wrong,
             forms=forms,
         )
-        if _emptier_than_empty(self.inner, found):
+        if _emptier_than_empty(self.inner, fitted):
             raise SimulationError("a pressure behind a slow gauge is below the ambient")
-        return found
+        return fitted
 
     def _fit_alone(self, names: tuple[str, ...]) -> Fit:
         """Fit freed parameters in a few steps from nominal values of all others.
@@ -480,12 +482,12 @@ class Attempts:
             evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
         )
 
-    def fit_freed_shortly(self, names: tuple[str, ...]) -> Candidate | None:
+    def fit_freed_shortly(self, names: tuple[str, ...]) -> FittedHypothesis | None:
         """Fit the baseline with some parameters freed in a few steps, from where these go alone:
         enough to see which of many are worth a whole fit.
         """
 
-        def found() -> Candidate:
+        def fit_and_judge() -> FittedHypothesis:
             short = fit(
                 self.inner,
                 self.nominal,
@@ -498,11 +500,11 @@ class Attempts:
             )
             return replace(self.judge((), short), wrong=names)
 
-        return self._attempt(names, found)
+        return self._attempt(names, fit_and_judge)
 
     def fit_freed(
         self, names: tuple[str, ...], baseline: Fit, share: float | None = None
-    ) -> Candidate | None:
+    ) -> FittedHypothesis | None:
         """Fit the baseline to its end with some parameters freed from their tolerance; None where
         it cannot be run.
 
@@ -513,29 +515,29 @@ class Attempts:
         settings = self.settings
         least = FINAL_STEP_SHARE if share is None else share
 
-        def fitted(autocorrelation: dict[str, float], begun: Fit) -> Fit:
+        def fitted(autocorrelation: dict[str, float], warm: Fit) -> Fit:
             return fit(
                 self.inner,
                 self.nominal,
                 (),
                 {},
                 autocorrelation,
-                warm=begun,
+                warm=warm,
                 freed=names,
                 evaluations=settings.baseline_evaluations,
                 share=least,
             )
 
-        def found(alone: bool) -> Candidate:
+        def fit_and_judge(alone: bool) -> FittedHypothesis:
             first = fitted(self.white, self._fit_alone(names) if alone else baseline)
             autocorrelation = self.autocorrelation(first)
             correlated = autocorrelation.largest > CORRELATED_VARIANCE
             judged = self.judge((), fitted(autocorrelation, first) if correlated else first)
             return replace(judged, wrong=names)
 
-        best: Candidate | None = None
+        best: FittedHypothesis | None = None
         for alone in (True, False):
-            judged = self._attempt(names, partial(found, alone))
+            judged = self._attempt(names, partial(fit_and_judge, alone))
             if judged is None:
                 continue
             if best is None or judged.misfit < best.misfit:
@@ -546,7 +548,7 @@ class Attempts:
 
     def fit_together(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
-    ) -> Candidate | None:
+    ) -> FittedHypothesis | None:
         """Fit effects, each from a start, with some parameters freed from their tolerance; None
         where the model cannot be run, or where these parameters stay inside their tolerances.
         """
@@ -554,10 +556,10 @@ class Attempts:
             return self.fit_effects(starts, warm, self.white)
         limit = self.settings.effect_evaluations
         names = (*(start.effect for start in starts), *wrong)
-        found = self._attempt(names, lambda: self._continue(starts, warm, wrong, limit))
-        if found is None or not found.is_wrong(self.settings.most_tolerances):
+        candidate = self._attempt(names, lambda: self._continue(starts, warm, wrong, limit))
+        if candidate is None or not candidate.is_wrong(self.settings.most_tolerances):
             return None
-        return found
+        return candidate
 
     def _continue(
         self,
@@ -566,25 +568,27 @@ class Attempts:
         wrong: tuple[str, ...],
         evaluations: int,
         share: float | None = None,
-    ) -> Candidate:
+    ) -> FittedHypothesis:
         """Continue a fit of effects and freed parameters until its weights stop falling."""
         effects = tuple(start.effect for start in starts)
-        weights, found = self.autocorrelation(warm), warm
+        weights, fitted = self.autocorrelation(warm), warm
         for _ in range(_MOST_WEIGHTINGS):
-            found = self._fit(
-                starts, weights, found, wrong=wrong, evaluations=evaluations, share=share
+            fitted = self._fit(
+                starts, weights, fitted, wrong=wrong, evaluations=evaluations, share=share
             )
-            left = self.autocorrelation(found)
-            if not self._lighter(left, weights):
+            weights_left = self.autocorrelation(fitted)
+            if not self._lighter(weights_left, weights):
                 break
-            weights, starts = left, [self.start_of(found, effect) for effect in effects]
-        return replace(self.judge(effects, found), wrong=wrong)
+            weights, starts = weights_left, [self.start_of(fitted, effect) for effect in effects]
+        return replace(self.judge(effects, fitted), wrong=wrong)
 
-    def _lighter(self, left: dict[str, float], weights: dict[str, float]) -> bool:
+    def _lighter(self, weights_left: dict[str, float], weights: dict[str, float]) -> bool:
         """True where a fit leaves much less autocorrelation than it was weighted by."""
-        return any(CORRELATED_VARIANCE * now < weights[block] for block, now in left.items())
+        return any(
+            CORRELATED_VARIANCE * now < weights[block] for block, now in weights_left.items()
+        )
 
-    def fit_united(self, candidates: list[Candidate]) -> Fit | None:
+    def fit_united(self, candidates: list[FittedHypothesis]) -> Fit | None:
         """Fit all that several hypotheses name, each for its own block; None where it fails."""
         if any(c.fit.events is not None for c in candidates):
             return None
@@ -600,18 +604,18 @@ class Attempts:
             names, lambda: self._fit(starts, self.white, warm, wrong=wrong, share=FINAL_STEP_SHARE)
         )
 
-    def polish(self, candidate: Candidate) -> Candidate:
+    def polish(self, candidate: FittedHypothesis) -> FittedHypothesis:
         """Fit a candidate's persistent effects to the end.
 
         The first fit ends where little is to be gained; of sets that nearly say the same the one
         that was left further from its end would lose.
         """
-        found = candidate.fit
-        if found.events is not None or not candidate.effects:
+        fitted = candidate.fit
+        if fitted.events is not None or not candidate.effects:
             return candidate
         starts, end = self.starts_of(candidate), (_POLISH_EVALUATIONS, FINAL_STEP_SHARE)
         polished = self._attempt(
-            candidate.terms, lambda: self._continue(starts, found, candidate.wrong, *end)
+            candidate.terms, lambda: self._continue(starts, fitted, candidate.wrong, *end)
         )
         return candidate if polished is None else replace(polished, gain=candidate.gain)
 
@@ -622,7 +626,7 @@ def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:
 
 
 def autocorrelation_of(
-    problem: Problem, found: Fit, noise_level: Mapping[Key, NoiseLevel]
+    problem: Problem, fitted: Fit, noise_level: Mapping[Key, NoiseLevel]
 ) -> Weights:
     """Weights of the autocorrelation that a fit leaves in each block, at the least that of the
     noise: parameters that follow the noise of a drive leave too little of it. A recording that is
@@ -634,10 +638,17 @@ def autocorrelation_of(
         levels = [noise_level[key].inflation for key in keys if key in noise_level]
         return float(np.mean(levels)) if levels else 1.0
 
-    given = problem.recordings, found.residuals, FIT_BIN_TIME
-    usual = {b.name: max(noise_of(b), inflation(b, *given)) for b in problem.blocks}
+    recordings_and_residuals = problem.recordings, fitted.residuals, FIT_BIN_TIME
+    usual = {
+        b.name: max(noise_of(b), inflation(b, *recordings_and_residuals)) for b in problem.blocks
+    }
     return Weights(
-        usual, {key: own for b in problem.blocks for key, own in apart(b, *given).items()}
+        usual,
+        {
+            key: weight
+            for b in problem.blocks
+            for key, weight in apart(b, *recordings_and_residuals).items()
+        },
     )
 
 
@@ -655,23 +666,23 @@ def parts_of(
     return free, held, forms
 
 
-def start_of(found: Fit, effect: Term, least: float) -> Start:
+def start_of(fitted: Fit, effect: Term, least: float) -> Start:
     """Start of another fit from an effect as it was fitted, held parameters included.
 
     ``least`` is the share of a typical size that a parameter has at the least.
     """
-    own = {
+    free = {
         name: _off_zero(name, value, least)
-        for name, value in found.values.items()
+        for name, value in fitted.values.items()
         if effect_of(name) == effect
     }
-    entry = entry_of(found.rig, effect)
+    entry = entry_of(fitted.rig, effect)
     held = {
         f"{effect}.{n}": v
         for n, v in entry["parameters"].items()
-        if f"{effect}.{n}" not in found.values
+        if f"{effect}.{n}" not in fitted.values
     }
-    return Start(effect, own, held, (), False, form_in(found.rig, effect))
+    return Start(effect, free, held, (), False, form_in(fitted.rig, effect))
 
 
 def _off_zero(name: str, value: float, share: float) -> float:
@@ -688,10 +699,10 @@ def _typical(name: str) -> float:
     )
 
 
-def _emptier_than_empty(problem: Problem, found: Fit) -> bool:
+def _emptier_than_empty(problem: Problem, fitted: Fit) -> bool:
     """True where a gauge's fitted lag implies pressures below ambient, and no recording has any."""
-    for entry in found.rig.effects:
-        if "reading" not in ports_of(entry) or Term.of(entry) not in found.effects:
+    for entry in fitted.rig.effects:
+        if "reading" not in ports_of(entry) or Term.of(entry) not in fitted.effects:
             continue
         lag = entry["parameters"]["time_constant"]
         for prepared in problem.recordings:
@@ -728,18 +739,18 @@ def _scatter(effects: tuple[Term, ...], problem: Problem, best: Fit) -> float:
     if size == 0.0:
         return 0.0
     try:
-        found = residuals(problem, best.rig, [leading])
+        with_slopes = residuals(problem, best.rig, [leading])
     except SimulationError:
         return 0.0  # nothing is known of it
     steps, errors = [], []
     for prepared in problem.recordings:
         num = den = 0.0
         for block in problem.blocks:
-            r = found[block.name, prepared.recording.name]
+            r = with_slopes[block.name, prepared.recording.name]
             if r.jacobian is None or not acts_in(effects[0], block):
                 continue
             slope = r.jacobian[:, 0] / r.noise
-            unit = inflation(block, [prepared], found, FIT_BIN_TIME)
+            unit = inflation(block, [prepared], with_slopes, FIT_BIN_TIME)
             num += float(slope @ (r.value / r.noise)) / unit
             den += float(slope @ slope) / unit
         if den > 0:

@@ -99,43 +99,43 @@ class Likelihood:
     _known: dict[tuple[object, ...], _Covariance] = field(default_factory=dict, repr=False)
     _lock: Lock = field(default_factory=Lock, repr=False)
 
-    def of(self, found: Mapping[Key, Residual]) -> dict[str, BlockLikelihood]:
+    def of(self, residuals: Mapping[Key, Residual]) -> dict[str, BlockLikelihood]:
         """Likelihood of residuals, by block."""
-        return {block.name: self._of_block(block.name, found) for block in self.blocks}
+        return {block.name: self._of_block(block.name, residuals) for block in self.blocks}
 
-    def _of_block(self, name: str, found: Mapping[Key, Residual]) -> BlockLikelihood:
+    def _of_block(self, name: str, residuals: Mapping[Key, Residual]) -> BlockLikelihood:
         at: list[object] = [name]
         rows: list[Array] = []
-        seen_in: list[tuple[Prepared, NDArray[np.intp]]] = []
+        bins_in: list[tuple[Prepared, NDArray[np.intp]]] = []
         for prepared in self.recordings:
             key = name, prepared.recording.name
-            seen, own = means_in_noises(prepared, found[key], self.noise_level[key])
-            if own.size:
-                at += [prepared.recording.name, seen.tobytes()]
-                rows.append(own)
-                seen_in.append((prepared, seen))
+            bins, means = means_in_noises(prepared, residuals[key], self.noise_level[key])
+            if means.size:
+                at += [prepared.recording.name, bins.tobytes()]
+                rows.append(means)
+                bins_in.append((prepared, bins))
         with self._lock:  # hypotheses are judged two at a time
             known = self._known.get(tuple(at))
             if known is None:
-                known = self._known[tuple(at)] = self._covariance(name, seen_in)
+                known = self._known[tuple(at)] = self._covariance(name, bins_in)
         return known.likelihood(rows)
 
     def _covariance(
-        self, name: str, seen_in: list[tuple[Prepared, NDArray[np.intp]]]
+        self, name: str, bins_in: list[tuple[Prepared, NDArray[np.intp]]]
     ) -> _Covariance:
         """Covariance of the usable bin means of a block."""
-        times = [bins_of(p) * p.dt * seen.astype(np.float64) for p, seen in seen_in]
-        levels = [self.noise_level[name, p.recording.name] for p, _ in seen_in]
-        both = zip(levels, seen_in, strict=True)
-        return _Covariance(times, [level.curves_in_noises(seen) for level, (_, seen) in both])
+        times = [bins_of(p) * p.dt * bins.astype(np.float64) for p, bins in bins_in]
+        levels = [self.noise_level[name, p.recording.name] for p, _ in bins_in]
+        both = zip(levels, bins_in, strict=True)
+        return _Covariance(times, [level.curves_in_noises(bins) for level, (_, bins) in both])
 
 
 class _Covariance:
     """The covariance of a block's bin means under each size of the error that nobody states."""
 
     def __init__(self, times: list[Array], curves: list[Array]) -> None:
-        self._without = _Sized(0.0, times, curves)
-        self._each = [_Sized(size, times, curves) for size in _SIZES]
+        self._without = _CovarianceAtSize(0.0, times, curves)
+        self._each = [_CovarianceAtSize(size, times, curves) for size in _SIZES]
         self._sizes = np.array([0.0, *_BETWEEN])
         volume = self._between([sized.volume for sized in self._each])
         self._volume = np.array([self._without.volume, *volume])
@@ -162,7 +162,7 @@ class _Covariance:
         return BlockLikelihood(self._sizes, by_size, self._volume, count, mean, self._error_power)
 
 
-class _Sized:
+class _CovarianceAtSize:
     """Covariance of a block's bin means for one size of the unstated error.
 
     In time the error is an Ornstein-Uhlenbeck process, whose inverse covariance is tridiagonal, so
@@ -197,25 +197,25 @@ class _Sized:
 
     def square(self, rows: list[Array]) -> float:
         """Rows times the inverse of their covariance times rows."""
-        found, told = 0.0, np.zeros(0 if self._normal is None else len(self._normal[0]))
+        total, projected = 0.0, np.zeros(0 if self._normal is None else len(self._normal[0]))
         for k, y in enumerate(rows):
             white, curves = self._white(k, y), self._curves[k]
-            found += float(y @ white)
-            told[: curves.shape[1]] += curves.T @ white
+            total += float(y @ white)
+            projected[: curves.shape[1]] += curves.T @ white
         if self._normal is None:
-            return found
-        return found - float(told @ cho_solve(self._normal, told))
+            return total
+        return total - float(projected @ cho_solve(self._normal, projected))
 
 
 def _inverse(times: Array) -> tuple[Array, float]:
     """Inverse covariance of an Ornstein-Uhlenbeck process of variance one at some times, as its
     diagonal and the one below it (2, n), and the log determinant of the covariance.
     """
-    kept = np.exp(-np.diff(times) / _ERROR_TIME)
-    fresh = 1.0 - kept**2
+    remembered = np.exp(-np.diff(times) / _ERROR_TIME)
+    fresh = 1.0 - remembered**2
     bands = np.zeros((2, times.size))
     bands[0] = 1.0
     bands[0, 1:] = 1.0 / fresh
-    bands[0, :-1] += kept**2 / fresh
-    bands[1, :-1] = -kept / fresh
+    bands[0, :-1] += remembered**2 / fresh
+    bands[1, :-1] = -remembered / fresh
     return bands, float(np.log(fresh).sum())

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from scipy.stats import chi2
 
-from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate, significant
+from pamrs.diagnosis.evidence._candidates import BlockGroup, FittedHypothesis, significant
 from pamrs.diagnosis.evidence._weighing import price_of_term
 from pamrs.diagnosis.fit import Fit
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -29,7 +29,7 @@ from pamrs.effects import (
     effect_of,
 )
 
-_HEALTHY = (NONE, PARAMETERS)  # hypotheses of which nothing is missing
+_HEALTHY_HYPOTHESES = (NONE, PARAMETERS)  # hypotheses of which nothing is missing
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
 SHARED_ODDS = 6.0
 _ALIKE_STDS = 3.0  # [standard deviations] by which the values of one name in two groups may differ
@@ -70,7 +70,7 @@ class Judged:
         The most probable first.
     ambiguity : list of Hypothesis
         Those that are left open; empty when settled.
-    chosen : Candidate
+    chosen : FittedHypothesis
         The hypothesis that is named; the baseline where none is.
     """
 
@@ -78,7 +78,7 @@ class Judged:
     verdict: str
     probabilities: dict[Hypothesis, float]
     ambiguity: list[Hypothesis]
-    chosen: Candidate
+    chosen: FittedHypothesis
 
     @property
     def named(self) -> tuple[Term, ...]:
@@ -109,14 +109,14 @@ def _at_wall(fit: Fit) -> dict[str, float]:
     return {name: far for name, far in fit.moved.items() if abs(far) >= WALL_TOLERANCES}
 
 
-def _own(group: BlockGroup) -> dict[Hypothesis, float]:
+def _probabilities_alone(group: BlockGroup) -> dict[Hypothesis, float]:
     """Probabilities of one group alone, with that of `UNDECIDED` divided among other answers."""
-    found = {h: p for h, p in group.probabilities.items() if h != UNDECIDED}
+    weights = {h: p for h, p in group.probabilities.items() if h != UNDECIDED}
     unchanged = group.probabilities.get(UNDECIDED, 0.0)
     if _leaves_little(group):
-        unchanged += found.pop(UNLISTED, 0.0)
+        unchanged += weights.pop(UNLISTED, 0.0)
     shifted = any(significant(e) for e in group.nominal.values())
-    explained = any(c.wrong and found.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates)
+    explained = any(c.wrong and weights.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates)
     quiet = {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
     unlikely = is_unlikely(group.candidates[0].fit)
     if unlikely and group.mismatch is None and not explained:
@@ -124,8 +124,8 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
     elif not shifted:
         quiet |= {NONE: _QUIET_LIKELY, PARAMETERS: _QUIET_OTHER}
     for hypothesis, share in quiet.items():
-        found[hypothesis] = found.get(hypothesis, 0.0) + unchanged * share
-    return {h: p for h, p in found.items() if p >= _COUNTED or h in WITHOUT_NAME}
+        weights[hypothesis] = weights.get(hypothesis, 0.0) + unchanged * share
+    return {h: p for h, p in weights.items() if p >= _COUNTED or h in WITHOUT_NAME}
 
 
 def _leaves_little(group: BlockGroup) -> bool:
@@ -142,7 +142,7 @@ def is_unlikely(fit: Fit) -> bool:
     if _at_wall(fit):
         return True
     moved = sum(abs(far) > 0.0 for far in fit.held_by_prior.values())
-    starts = sum(found.strain > 0.0 for found in fit.residuals.values())
+    starts = sum(residual.strain > 0.0 for residual in fit.residuals.values())
     return bool(chi2.sf(fit.strain + fit.start_strain, max(1, moved + starts)) < _UNLIKELY)
 
 
@@ -156,11 +156,11 @@ def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Jud
     settings : DiagnosisSettings
         Odds of what is shared, probabilities from which something is named or left open.
     """
-    own = [_own(group) for group in groups]
+    alone = [_probabilities_alone(group) for group in groups]
     joint: list[dict[Hypothesis, float]] = [{} for _ in groups]
-    several = _in_several(own)
+    several = _in_several(alone)
     fitted = [{c.hypothesis: c for c in group.candidates} for group in groups]
-    for choice in itertools.product(*(p.items() for p in own)):
+    for choice in itertools.product(*(p.items() for p in alone)):
         if not _possible_together(_terms(h for h, _ in choice)):
             continue  # one effect everywhere and at a place of its own
         weight = math.prod(p for _, p in choice)
@@ -171,11 +171,11 @@ def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Jud
                 if term in hypothesis.terms
             ]
             weight *= _odds_shared(term, holders, settings)
-        for found, (hypothesis, _) in zip(joint, choice, strict=True):
-            found[hypothesis] = found.get(hypothesis, 0.0) + weight
+        for weights, (hypothesis, _) in zip(joint, choice, strict=True):
+            weights[hypothesis] = weights.get(hypothesis, 0.0) + weight
     return [
-        _judged(group, _normalised(_capped(found, settings.most_probability)), settings)
-        for group, found in zip(groups, joint, strict=True)
+        _judged(group, _normalised(_capped(weights, settings.most_probability)), settings)
+        for group, weights in zip(groups, joint, strict=True)
     ]
 
 
@@ -190,14 +190,14 @@ def _capped(weights: dict[Hypothesis, float], most: float) -> dict[Hypothesis, f
     return capped
 
 
-def _in_several(own: Sequence[Mapping[Hypothesis, float]]) -> list[Term]:
+def _in_several(alone: Sequence[Mapping[Hypothesis, float]]) -> list[Term]:
     """Terms that hypotheses of several groups have."""
-    named = [set(_terms(found)) for found in own]
+    named = [set(_terms(weights)) for weights in alone]
     return sorted({term for one, two in itertools.combinations(named, 2) for term in one & two})
 
 
 def _odds_shared(
-    term: Term, holders: Sequence[tuple[BlockGroup, Candidate]], settings: DiagnosisSettings
+    term: Term, holders: Sequence[tuple[BlockGroup, FittedHypothesis]], settings: DiagnosisSettings
 ) -> float:
     """Odds that one name acts in several groups of blocks, against a separate cause in each.
 
@@ -213,10 +213,10 @@ def _odds_shared(
     return SHARED_ODDS ** (len(holders) - 1) * math.exp(again)
 
 
-def _same_values(term: Term, candidates: Sequence[Candidate]) -> bool:
+def _same_values(term: Term, candidates: Sequence[FittedHypothesis]) -> bool:
     """True where all candidates give one term values that may be the same."""
 
-    def same(parameter: str, *both: Candidate) -> bool:
+    def same(parameter: str, *both: FittedHypothesis) -> bool:
         first, second = (c.fit.values[parameter] for c in both)
         stds = (c.fit.std.get(parameter, math.inf) for c in both)
         return are_alike(first, second, math.hypot(*stds))
@@ -252,7 +252,7 @@ def _judged(
     """Judge a group by its likeliest hypothesis; unlisted only if no name exceeds ``named``."""
     start = group.candidates[0]
     named = {h: p for h, p in probabilities.items() if h not in WITHOUT_NAME}
-    healthy = max(_HEALTHY, key=lambda h: probabilities.get(h, 0.0))
+    healthy = max(_HEALTHY_HYPOTHESES, key=lambda h: probabilities.get(h, 0.0))
     without = probabilities.get(UNLISTED, 0.0)
     best = max(named, key=lambda h: named[h], default=UNDECIDED)
     ambiguity = _left_open(probabilities, settings)
@@ -273,16 +273,16 @@ def _left_open(
     """Hypotheses that are left open, the most probable first; none where one is settled, `NONE` and
     `PARAMETERS` being one answer.
     """
-    healthy = sum(probabilities.get(h, 0.0) for h in _HEALTHY)
-    others = [p for h, p in probabilities.items() if h not in _HEALTHY]
+    healthy = sum(probabilities.get(h, 0.0) for h in _HEALTHY_HYPOTHESES)
+    others = [p for h, p in probabilities.items() if h not in _HEALTHY_HYPOTHESES]
     if max(healthy, *others, 0.0) > settings.settled:
         return []
-    found = [
+    open_ones = [
         Hypothesis(tuple(sorted(h.terms)), h.rest)
         for h, p in probabilities.items()
         if p >= settings.in_set
     ]
-    return found if len(found) > 1 else []
+    return open_ones if len(open_ones) > 1 else []
 
 
 def case_probabilities(judged: Sequence[Judged]) -> dict[Hypothesis, float]:
@@ -291,12 +291,12 @@ def case_probabilities(judged: Sequence[Judged]) -> dict[Hypothesis, float]:
     `UNLISTED` is that something is missing and nothing has a name. What one block keeps without a
     name takes nothing from a name in another.
     """
-    found = dict.fromkeys(WITHOUT_NAME, 0.0)
+    answers = dict.fromkeys(WITHOUT_NAME, 0.0)
     for choice in itertools.product(*(j.probabilities.items() for j in judged)):
         terms = tuple(_terms(h for h, _ in choice))
         answer = Hypothesis(terms, "" if terms else _rest(h for h, _ in choice) or NONE.rest)
-        found[answer] = found.get(answer, 0.0) + math.prod(p for _, p in choice)
-    return _normalised({h: p for h, p in found.items() if p >= _LISTED or h in WITHOUT_NAME})
+        answers[answer] = answers.get(answer, 0.0) + math.prod(p for _, p in choice)
+    return _normalised({h: p for h, p in answers.items() if p >= _LISTED or h in WITHOUT_NAME})
 
 
 def case_ambiguity(judged: Sequence[Judged]) -> list[Hypothesis]:
@@ -307,14 +307,14 @@ def case_ambiguity(judged: Sequence[Judged]) -> list[Hypothesis]:
         return []
     # what a block is settled to keep without a name is no part of the question
     options = [j.ambiguity or [Hypothesis(j.added)] for j in judged]
-    found: list[Hypothesis] = []
+    answers: list[Hypothesis] = []
     for choice in itertools.product(*options):
         terms, rest = tuple(_terms(choice)), _rest(choice)
         # of what has no name, only that something is missing counts beside a name
         entry = Hypothesis(terms, rest if not terms or rest == UNLISTED.rest else "")
-        if entry.words and entry not in found:
-            found.append(entry)
-    return found[:_MOST_SETS] if len(found) > 1 else []
+        if entry.words and entry not in answers:
+            answers.append(entry)
+    return answers[:_MOST_SETS] if len(answers) > 1 else []
 
 
 def _terms(hypotheses: Iterable[Hypothesis]) -> list[Term]:
@@ -324,5 +324,5 @@ def _terms(hypotheses: Iterable[Hypothesis]) -> list[Term]:
 
 def _rest(hypotheses: Iterable[Hypothesis]) -> str:
     """Worst of the answers without a name; empty where no hypothesis gives one."""
-    said = {hypothesis.rest for hypothesis in hypotheses}
-    return next((h.rest for h in reversed(WITHOUT_NAME) if h.rest in said), "")
+    rests = {hypothesis.rest for hypothesis in hypotheses}
+    return next((h.rest for h in reversed(WITHOUT_NAME) if h.rest in rests), "")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from pamrs.diagnosis.evidence._candidates import Candidate, significant
+from pamrs.diagnosis.evidence._candidates import FittedHypothesis, significant
 from pamrs.diagnosis.fit import Fit, Problem, form_in, moved_value, same_data_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
@@ -78,24 +78,24 @@ class Weighing:
     settings: DiagnosisSettings
 
 
-def probability_cap(fitted: Problem, mismatch: Block, left: float, *, alone: bool) -> float:
+def probability_cap(fitted: Problem, mismatch: Block, rms_left: float, *, alone: bool) -> float:
     """Largest probability that any name can get, which is less where the proof is weak.
 
     A slow drift of less than two percent of the pressure of a sealed chamber, with no held-out
     recording, may as well be the bench's own loss, creep of a wall or the transducer's drift.
-    ``alone`` says that the chamber is sealed and nothing is held out, ``left`` what the refit
+    ``alone`` says that the chamber is sealed and nothing is held out, ``rms_left`` what the refit
     leaves of the channel.
     """
     settings = fitted.settings
     if not alone or mismatch.channel != "muscle_pressure":
         return settings.most_probability
     typical = np.mean([np.mean(np.abs(p.signals["muscle_pressure"][0])) for p in fitted.recordings])
-    drifts = left < settings.drift_share * float(typical)
+    drifts = rms_left < settings.drift_share * float(typical)
     return settings.drift_probability if drifts else settings.most_probability
 
 
 def weigh(
-    candidates: list[Candidate], suspects: list[Block], weighing: Weighing
+    candidates: list[FittedHypothesis], suspects: list[Block], weighing: Weighing
 ) -> dict[Hypothesis, float]:
     """Probabilities of the hypotheses and of ``unlisted`` (docs/decisions/0014).
 
@@ -111,7 +111,7 @@ def weigh(
 
     Parameters
     ----------
-    candidates : list of Candidate
+    candidates : list of FittedHypothesis
         The baseline first, then every hypothesis.
     suspects : list of Block
         Blocks by which they are compared.
@@ -133,10 +133,10 @@ def weigh(
     alike = {h: math.exp(max(-60.0, score - best)) for h, score in usual.items()}
     missed = _MISSED_ODDS * weights[UNLISTED] / max(sum(alike.values()), 1.0)
     for candidate in named:
-        own = candidate.hypothesis
-        lost = rare[own] + weighing.settings.further_price * (len(candidate.terms) - 1)
+        key = candidate.hypothesis
+        lost = rare[key] + weighing.settings.further_price * (len(candidate.terms) - 1)
         taken = _share_taken(candidate, start, suspects)
-        weights[own] += missed * alike[own] * taken * math.exp(-lost)
+        weights[key] += missed * alike[key] * taken * math.exp(-lost)
     total = sum(weights.values())
     out = {h: weight / total for h, weight in weights.items()}
     for hypothesis in [h for h in out if h.terms]:
@@ -146,28 +146,30 @@ def weigh(
     return out
 
 
-def _share_taken(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
+def _share_taken(
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+) -> float:
     """Share of the power of the baseline's error that a hypothesis removes, 0 to 1."""
     before, after = (
-        sum(found.likelihood()[b.name].size ** 2 for b in suspects)
-        for found in (baseline, candidate)
+        sum(hypothesis.likelihood()[b.name].size ** 2 for b in suspects)
+        for hypothesis in (baseline, candidate)
     )
     return min(1.0, max(0.0, 1.0 - after / before)) if before > 0.0 else 0.0
 
 
-def _counted(candidates: list[Candidate], suspects: list[Block]) -> float:
+def _counted(candidates: list[FittedHypothesis], suspects: list[Block]) -> float:
     """Share of the log evidence that counts (a power posterior): larger, the nearer the best
     hypothesis is to noise. Noise is independent from bin to bin; what no hypothesis explains is
     not.
     """
     powers = [[c.likelihood()[block.name].power for block in suspects] for c in candidates]
-    left = min(max(own, default=1.0) for own in powers)
-    return min(_MOST_SHARE, max(_LEAST_SHARE, _NOISE_SHARE / max(left, 1e-9)))
+    least_power = min(max(powers_of, default=1.0) for powers_of in powers)
+    return min(_MOST_SHARE, max(_LEAST_SHARE, _NOISE_SHARE / max(least_power, 1e-9)))
 
 
 def log_weight(
-    candidate: Candidate,
-    baseline: Candidate,
+    candidate: FittedHypothesis,
+    baseline: FittedHypothesis,
     suspects: list[Block],
     weighing: Weighing,
     share: float = _LEAST_SHARE,
@@ -175,61 +177,65 @@ def log_weight(
     """Logarithm of a hypothesis's weight, up to a constant: a share of its evidence in some blocks,
     less its price, its moved parameters and its rare values.
     """
-    told = _evidence(candidate, baseline, suspects, share) - _strain(candidate)
-    return told - prior_loss(candidate, weighing)
+    evidence = _evidence(candidate, baseline, suspects, share) - _strain(candidate)
+    return evidence - prior_loss(candidate, weighing)
 
 
-def prior_loss(candidate: Candidate, weighing: Weighing) -> float:
+def prior_loss(candidate: FittedHypothesis, weighing: Weighing) -> float:
     """Loss of a hypothesis before any data: its price, and values that its physics hardly has."""
     return price(candidate, weighing.settings) + _rarity(candidate, weighing)
 
 
-def _rarity(candidate: Candidate, weighing: Weighing) -> float:
+def _rarity(candidate: FittedHypothesis, weighing: Weighing) -> float:
     """Log odds that a hypothesis loses by values that its physics hardly has."""
     lost = loss_by_values(candidate)
     lost += _STANDING_PRICE * _lacks_drift(candidate, weighing.seconds)
     return lost + _UNSEEN_PRICE * _has_unseen_time(candidate, weighing.seconds)
 
 
-def _strain(candidate: Candidate) -> float:
+def _strain(candidate: FittedHypothesis) -> float:
     """Log odds that a hypothesis loses by moved parameters and by how warm gases began."""
     return 0.5 * _STRAIN_SHARE * (candidate.fit.strain + candidate.fit.start_strain)
 
 
 def _evidence(
-    candidate: Candidate, baseline: Candidate, suspects: list[Block], share: float
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block], share: float
 ) -> float:
     """Share of a hypothesis's log evidence in some blocks, at the best size of the unstated error;
     an error above a tenth of what the hypothesis explains costs more, the larger it is.
     """
     total = 0.0
     for name in (block.name for block in suspects):
-        own, before = candidate.likelihood()[name], baseline.likelihood()[name]
-        taken = max(0.0, before.size**2 - own.size**2)
+        now, before = candidate.likelihood()[name], baseline.likelihood()[name]
+        taken = max(0.0, before.size**2 - now.size**2)
         expected = _LEAST_ERROR + _FORM_ERROR * math.sqrt(taken)
-        beyond = np.log(np.maximum(own.sizes, expected) / expected) / _FORM_SPREAD
+        beyond = np.log(np.maximum(now.sizes, expected) / expected) / _FORM_SPREAD
         # windows that are too short for a hypothesis leave it fewer bins
-        told = share * before.count / max(1, own.count) * own.by_size
-        total += float((told - 0.5 * beyond**2).max())
+        tempered = share * before.count / max(1, now.count) * now.by_size
+        total += float((tempered - 0.5 * beyond**2).max())
     return total
 
 
-def _log_weight_unlisted(baseline: Candidate, suspects: list[Block], share: float) -> float:
+def _log_weight_unlisted(baseline: FittedHypothesis, suspects: list[Block], share: float) -> float:
     """Log weight of physics without a name, as if a right name explained all."""
     total = 0.0
-    for found in (baseline.likelihood()[block.name] for block in suspects):
-        left = _LEAST_ERROR + _FORM_ERROR * found.size
-        total += max(found.most, found.expected(left))
+    for likelihood in (baseline.likelihood()[block.name] for block in suspects):
+        error = _LEAST_ERROR + _FORM_ERROR * likelihood.size
+        total += max(likelihood.most, likelihood.expected(error))
     return share * total - _UNLISTED_PRICE - _strain(baseline)
 
 
-def possible_gain(candidate: Candidate, suspects: list[Block]) -> float:
+def possible_gain(candidate: FittedHypothesis, suspects: list[Block]) -> float:
     """Largest rise of a candidate's log weight by an addition that leaves nothing but noise."""
-    own = [candidate.likelihood()[block.name] for block in suspects]
-    return _LEAST_SHARE * sum(max(0.0, found.expected(0.0) - found.most) for found in own)
+    likelihoods = [candidate.likelihood()[block.name] for block in suspects]
+    return _LEAST_SHARE * sum(
+        max(0.0, likelihood.expected(0.0) - likelihood.most) for likelihood in likelihoods
+    )
 
 
-def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
+def share_left(
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+) -> float:
     """Share of the baseline's excess variance that a set of effects leaves in held-out recordings.
 
     Held-out recordings that hardly show the mismatch cannot say how much of it is left: the fitted
@@ -249,7 +255,7 @@ def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block])
 
 
 def _excesses(
-    candidate: Candidate, baseline: Candidate, suspects: list[Block]
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
 ) -> list[tuple[float, float]]:
     """Excess variance that the baseline and a set leave, on fitted and on held-out recordings."""
 
@@ -262,7 +268,9 @@ def _excesses(
     ]
 
 
-def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> bool:
+def explains(
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+) -> bool:
     """True where a candidate leaves only noise, fitted and held out, of what was clearly more."""
     quiet = not any(
         significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out)
@@ -271,7 +279,7 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
     return quiet and after < _EXPLAINED_SHARE * before
 
 
-def is_absent(candidate: Candidate, walls: float) -> bool:
+def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
     """True where a wrong value may be inside its tolerances (`walls` of them), or all sizes of an
     effect together may be zero, within two standard deviations. A fit that goes on with such an
     effect may end lower without the effect's doing.
@@ -279,20 +287,20 @@ def is_absent(candidate: Candidate, walls: float) -> bool:
     Two sizes that do nearly the same may each be as uncertain as it is large, and their sum known
     well. The shape is taken as it was fitted: that of what is not there is anything.
     """
-    found = candidate.fit
+    fitted = candidate.fit
     if may_be_inside(candidate, walls, _SAME_STDS):
         return True
-    if found.events is not None:
+    if fitted.events is not None:
         return False
-    names = list(found.values)
+    names = list(fitted.values)
     for effect in candidate.effects:
-        own = [name for name in names if effect_of(name) == effect]
-        sizes = np.isin(own, fitted_sizes(found, effect))
+        names_of = [name for name in names if effect_of(name) == effect]
+        sizes = np.isin(names_of, fitted_sizes(fitted, effect))
         if not sizes.any():
             continue
-        at = [names.index(name) for name in own]
-        values = np.array([found.values[n] / found.scales[n] for n in own])[sizes]
-        spread = found.covariance[np.ix_(at, at)]
+        at = [names.index(name) for name in names_of]
+        values = np.array([fitted.values[n] / fitted.scales[n] for n in names_of])[sizes]
+        spread = fitted.covariance[np.ix_(at, at)]
         certain = np.any((values != 0.0) & (np.diag(spread)[sizes] == 0.0))
         distance = values @ np.linalg.pinv(spread, hermitian=True)[np.ix_(sizes, sizes)] @ values
         if not certain and is_near_none(distance, values.size, _SAME_STDS):
@@ -300,12 +308,12 @@ def is_absent(candidate: Candidate, walls: float) -> bool:
     return False
 
 
-def fitted_sizes(found: Fit, effect: Term) -> list[str]:
+def fitted_sizes(fitted: Fit, effect: Term) -> list[str]:
     """Fitted parameters of an effect that are zero where it is absent."""
-    sealed = found.rig.model["valve"] is None
-    form = effect.info.form(form_in(found.rig, effect))
+    sealed = fitted.rig.model["valve"] is None
+    form = effect.info.form(form_in(fitted.rig, effect))
     sizes = (p for p in form.parameters if p.role_in(sealed=sealed) == "size" and p.neutral == 0.0)
-    return [name for p in sizes if (name := f"{effect}.{p.name}") in found.values]
+    return [name for p in sizes if (name := f"{effect}.{p.name}") in fitted.values]
 
 
 def is_near_none(distance: float, count: int, stds: float) -> bool:
@@ -315,41 +323,43 @@ def is_near_none(distance: float, count: int, stds: float) -> bool:
     return bool(chi2.sf(distance, count) >= chi2.sf(stds**2, 1))
 
 
-def may_be_inside(candidate: Candidate, walls: float, stds: float) -> bool:
+def may_be_inside(candidate: FittedHypothesis, walls: float, stds: float) -> bool:
     """True where a value called wrong is inside its tolerances or less than `stds` outside."""
     return any(value_may_be_inside(candidate.fit, name, walls, stds) for name in candidate.wrong)
 
 
-def value_may_be_inside(found: Fit, name: str, walls: float, stds: float) -> bool:
+def value_may_be_inside(fitted: Fit, name: str, walls: float, stds: float) -> bool:
     """True where a fitted value is inside its tolerances (`walls` of them), or less than `stds`
     standard deviations outside.
     """
-    wall = moved_value(found.known[name], math.copysign(walls, found.moved[name]))
-    beyond = math.copysign(1.0, found.moved[name]) * (found.values[name] - wall)
-    return beyond < stds * found.std.get(name, 0.0)
+    wall = moved_value(fitted.known[name], math.copysign(walls, fitted.moved[name]))
+    beyond = math.copysign(1.0, fitted.moved[name]) * (fitted.values[name] - wall)
+    return beyond < stds * fitted.std.get(name, 0.0)
 
 
-def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
+def same_recordings(candidate: FittedHypothesis, effect: Term, seconds: float) -> bool:
     """True where an effect as fitted leaves the recordings that another effect would leave."""
     same = same_data_in(candidate.fit.rig, effect)
     if same is None:
         return False
-    own: dict[str, float] = next(
+    parameters: dict[str, float] = next(
         (e["parameters"] for e in candidate.fit.rig.effects if Term.of(e) == effect), {}
     )
-    if not own:
+    if not parameters:
         return False
     telling, spread = (
-        own[same.without] * seconds,
+        parameters[same.without] * seconds,
         candidate.fit.std.get(f"{effect}.{same.without}", 0.0) * seconds,
     )
-    at_rest = abs(telling) < max(_SAME_SHARE * abs(own[same.size]), _SAME_STDS * spread)
+    at_rest = abs(telling) < max(_SAME_SHARE * abs(parameters[same.size]), _SAME_STDS * spread)
     return bool(
-        own[same.size] > 0.0 and at_rest and all(own[name] == value for name, value in same.held)
+        parameters[same.size] > 0.0
+        and at_rest
+        and all(parameters[name] == value for name, value in same.held)
     )
 
 
-def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
+def _has_unseen_time(candidate: FittedHypothesis, seconds: float) -> bool:
     """True where a time constant is much longer than the recordings, or may be zero."""
     std = candidate.fit.std
     return any(
@@ -359,7 +369,7 @@ def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
     )
 
 
-def _lacks_drift(candidate: Candidate, seconds: float) -> bool:
+def _lacks_drift(candidate: FittedHypothesis, seconds: float) -> bool:
     """True where a clock drifts by less than its offset: that is a lag or a dead time."""
 
     def at_rest(effect: Term, same: SameData) -> bool:
@@ -371,7 +381,7 @@ def _lacks_drift(candidate: Candidate, seconds: float) -> bool:
     return any(at_rest(e, same) for e in candidate.effects for same in e.info.same_data)
 
 
-def loss_by_values(candidate: Candidate) -> float:
+def loss_by_values(candidate: FittedHypothesis) -> float:
     """Log odds that a set loses by values that its physics hardly has.
 
     A parameter with a prior loses by its distance from it, as by a Cauchy distribution: a value of
@@ -381,7 +391,7 @@ def loss_by_values(candidate: Candidate) -> float:
     return sum(_loss_by_value(candidate, name) for name in candidate.fit.effect_values)
 
 
-def _loss_by_value(candidate: Candidate, name: str) -> float:
+def _loss_by_value(candidate: FittedHypothesis, name: str) -> float:
     """Log odds that a set loses by the value of one parameter."""
     lost, value = 0.0, candidate.fit.values[name]
     effect = effect_of(name)
@@ -399,29 +409,29 @@ def _loss_by_value(candidate: Candidate, name: str) -> float:
     return lost
 
 
-def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
+def price(candidate: FittedHypothesis, settings: DiagnosisSettings) -> float:
     """Log odds paid for names, parameters, events, possible places, and wrong values."""
-    own = sum(_own_price(candidate, term, settings) for term in candidate.terms)
-    own += settings.further_price * len(candidate.terms) + candidate.places
+    total = sum(_own_price(candidate, term, settings) for term in candidate.terms)
+    total += settings.further_price * len(candidate.terms) + candidate.places
     events = candidate.fit.events
     happened = 0 if events is None else sum(len(v) for v in events.values.values())
-    return own + settings.parameter_price * happened
+    return total + settings.parameter_price * happened
 
 
-def _own_price(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
+def _own_price(candidate: FittedHypothesis, term: Term, settings: DiagnosisSettings) -> float:
     """Log odds paid for an effect's parameters, or for how far a value of the file is wrong."""
     if term.id in candidate.wrong:
         return settings.wrong_price + candidate.outside_of(term.id, settings.most_tolerances)
-    own = (n for n in candidate.fit.effect_values if effect_of(n) == term)
-    return settings.parameter_price * sum(not find_parameter(n).repeats for n in own)
+    parameters = (n for n in candidate.fit.effect_values if effect_of(n) == term)
+    return settings.parameter_price * sum(not find_parameter(n).repeats for n in parameters)
 
 
-def price_of_term(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
+def price_of_term(candidate: FittedHypothesis, term: Term, settings: DiagnosisSettings) -> float:
     """Log odds that a set loses by one term before any data: price, values and place."""
-    own = _own_price(candidate, term, settings)
+    paid = _own_price(candidate, term, settings)
     if term.id in candidate.wrong:
-        return own
+        return paid
     rare = sum(
         _loss_by_value(candidate, n) for n in candidate.fit.effect_values if effect_of(n) == term
     )
-    return own + rare + candidate.places / max(1, len(candidate.effects))
+    return paid + rare + candidate.places / max(1, len(candidate.effects))

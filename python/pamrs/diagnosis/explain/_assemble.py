@@ -12,7 +12,7 @@ import numpy as np
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
     BlockGroup,
-    Candidate,
+    FittedHypothesis,
     Judged,
     share_left,
     with_stated_std,
@@ -35,12 +35,12 @@ from pamrs.diagnosis.model import (
     DETERMINED_SHARE,
     Conclusion,
     Models,
+    notes_on_constants,
     owners_of_effects,
     owners_of_parameters,
-    said_of_constants,
     with_std,
 )
-from pamrs.diagnosis.prepare import Unjudged, said_of_warm_starts
+from pamrs.diagnosis.prepare import Unjudged, notes_on_warm_starts
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.effects import CATALOGUE, Hypothesis, Term, effect_of
 from pamrs.findings import (
@@ -74,7 +74,7 @@ def assemble(
     fitted: Problem,
     held: Problem,
     groups: list[BlockGroup],
-    found: Conclusion,
+    conclusion: Conclusion,
     unjudged: Sequence[Unjudged] = (),
 ) -> Diagnosis:
     """Build the diagnosis from the groups of blocks and what was concluded of them.
@@ -87,69 +87,73 @@ def assemble(
         Recordings to fit and held-out ones (the same object when there are no others).
     groups : list of BlockGroup
         Gas blocks and arm, examined.
-    found : Conclusion
+    conclusion : Conclusion
         Model, errors, budget and free runs.
     unjudged : sequence of Unjudged
         Blocks of the rig that are not judged.
     """
-    nominal, models, judged = case.rig, found.models, found.judged
-    verdict, noise_level, part = models.verdict, found.noise_level, fitted.losses.part
+    nominal, models, judged = case.rig, conclusion.models, conclusion.judged
+    verdict, noise_level, part = models.verdict, conclusion.noise_level, fitted.losses.part
     named = any(j.named or j.wrong for j in judged)
     known = models.chosen if named else models.starts
     owners = models.owners if named else owners_of_parameters(known)
     changed = models.added or any(j.wrong for j in judged)
-    gap = _gap(found.table, _LEAST_GAP) if changed else None
+    inside, outside, errors = conclusion.inside, conclusion.outside, conclusion.errors
+    gap = _gap(conclusion.table, _LEAST_GAP) if changed else None
     blocks = block_entries(
-        judged, fitted, found.inside, held, found.outside, noise_level, found.own_errors
+        judged, fitted, inside, held, outside, noise_level, conclusion.own_errors
     )
     forms = _forms(models, fitted)
-    stages = [(fitted, found.inside)]
+    stages = [(fitted, inside)]
     if held is not fitted:
-        stages.insert(0, (held, found.outside))
+        stages.insert(0, (held, outside))
     effects = _effects(judged, verdict, fitted)
-    constants = said_of_constants(found.runs or [], [effect.id for effect in effects])
-    warm = {**found.inside["after"], **found.outside["after"]}
-    begun = said_of_warm_starts(fitted.blocks, [*fitted.recordings, *held.recordings], warm)
+    constants = notes_on_constants(conclusion.runs or [], [effect.id for effect in effects])
+    start_notes = notes_on_warm_starts(
+        fitted.blocks,
+        [*fitted.recordings, *held.recordings],
+        {**inside["after"], **outside["after"]},
+    )
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
         effects=effects,
-        ambiguity=[hypothesis.words for hypothesis in found.ambiguity],
-        probabilities={str(h): p for h, p in found.probabilities.items()},
+        ambiguity=[hypothesis.words for hypothesis in conclusion.ambiguity],
+        probabilities={str(h): p for h, p in conclusion.probabilities.items()},
         parameters=_parameters(nominal, known, owners),
-        fit=FitErrors(found.errors["fit"], found.errors["held_out"], gap),
+        fit=FitErrors(errors["fit"], errors["held_out"], gap),
         warnings=constants,
         rig=models.final
         if verdict == "none"
         else with_std(models.final, nominal, models.chosen, models.owners),
-        traces=_traces(fitted, held, found.inside, found.outside),
+        traces=_traces(fitted, held, inside, outside),
         blocks=[*blocks, *map(not_judged, unjudged)],
-        budget=found.budget,
+        budget=conclusion.budget,
         unexplained=unexplained(
-            judged, blocks, stages, noise_level, found.budget, forms, nominal, found.errors
+            judged, blocks, stages, noise_level, conclusion.budget, forms, nominal, errors
         ),
-        wrong_parameters=_wrong(models, fitted, found.table),
+        wrong_parameters=_wrong_parameters(models, fitted, conclusion.table),
         measured=list(case.channels),
         residuals=_block_table(groups),
-        tried=_tried(groups),
+        tried=_tried_sets(groups),
         considered=part("what was asked for", lambda: _considered(judged, fitted), []),
         tested=part("the list of what was tested", lambda: _tested(groups), []),
-        free_run=found.runs,
-        free_run_note=found.runs_note,
-        free_traces=found.curves,
+        free_run=conclusion.runs,
+        free_run_note=conclusion.runs_note,
+        free_traces=conclusion.curves,
         settings=fitted.settings,
     )
-    told = [
+    notes = [
         *words.absolute(case),
         *words.left_out(case, judged),
         *(words.reservations(models.chosen) if any(j.named or j.wrong for j in judged) else []),
-        *(words.worse(found.table) if models.added else []),
+        *(words.worse(conclusion.table) if models.added else []),
         *words.warnings(case, judged, diagnosis.parameters, held is fitted),
     ]
-    diagnosis = replace(diagnosis, warnings=[*constants, *told, *begun])
-    picture = _picture(diagnosis.answer.block, found, fitted)
-    where = words.where(diagnosis.answer, fitted, judged, picture, found.errors)
-    return _worded(replace(answered(diagnosis), where=where), case, judged, forms)
+    diagnosis = replace(diagnosis, warnings=[*constants, *notes, *start_notes])
+    picture = _picture(diagnosis.answer.block, conclusion, fitted)
+    where = words.where(diagnosis.answer, fitted, judged, picture, errors)
+    return _with_text(replace(answered(diagnosis), where=where), case, judged, forms)
 
 
 def answered(diagnosis: Diagnosis) -> Diagnosis:
@@ -163,20 +167,20 @@ def answered(diagnosis: Diagnosis) -> Diagnosis:
     return replace(diagnosis, verdict=answer.verdict, probabilities=chances)
 
 
-def _picture(located: str | None, found: Conclusion, fitted: Problem) -> Picture:
+def _picture(located: str | None, conclusion: Conclusion, fitted: Problem) -> Picture:
     """Conditions and times at which the answer's block is off; empty without such a block."""
     if located is None:
         return Picture()
     block = next(b for b in fitted.blocks if b.name == located)
-    nominal, residuals = found.models.nominal, found.inside["refit"]
+    nominal, residuals = conclusion.models.nominal, conclusion.inside["refit"]
     return fitted.losses.part(
         "the conditions of the mismatch",
-        lambda: describe(block, fitted.recordings, nominal, residuals, found.noise_level),
+        lambda: describe(block, fitted.recordings, nominal, residuals, conclusion.noise_level),
         Picture(),
     )
 
 
-def _worded(
+def _with_text(
     diagnosis: Diagnosis,
     case: Case,
     judged: list[Judged],
@@ -184,24 +188,24 @@ def _worded(
 ) -> Diagnosis:
     """Diagnosis with its verdict in words."""
     sought = any(j.group.sought for j in judged if j.verdict == "unlisted")
-    told = list(dict.fromkeys(forms.values()))
-    return replace(diagnosis, text=verdict_in_words(diagnosis, case, told, sought=sought))
+    sentences = list(dict.fromkeys(forms.values()))
+    return replace(diagnosis, text=verdict_in_words(diagnosis, case, sentences, sought=sought))
 
 
 def _forms(models: Models, fitted: Problem) -> dict[str, str]:
     """Sentences on the fitted form of a mismatch without a name, by block."""
-    found: dict[str, str] = {}
+    sentences: dict[str, str] = {}
     for judged, start, chosen in zip(models.judged, models.starts, models.chosen, strict=True):
         group = judged.group
         if judged.verdict == "unlisted" and group.closure is not None:
-            own = replace(fitted, blocks=group.blocks)
-            told = forms_of(chosen.fit, own, start.fit)
-            text = "\n".join(map(form_sentence, told))
-            found |= dict.fromkeys((b.name for b in group.blocks), text)
-    return found
+            part = replace(fitted, blocks=group.blocks)
+            forms = forms_of(chosen.fit, part, start.fit)
+            text = "\n".join(map(form_sentence, forms))
+            sentences |= dict.fromkeys((b.name for b in group.blocks), text)
+    return sentences
 
 
-def _tried(groups: list[BlockGroup]) -> list[Tried]:
+def _tried_sets(groups: list[BlockGroup]) -> list[Tried]:
     """Every fitted set of effects, with what it leaves of each block's excess."""
     return [
         Tried(
@@ -231,38 +235,38 @@ def _considered(judged: list[Judged], fitted: Problem) -> list[Considered]:
     """Probability and share left of each set that the caller asked for, by group of blocks with a
     mismatch in which a term of it acts; without blocks where there is no such group.
     """
-    found: list[Considered] = []
-    for asked in fitted.considered:
-        before = len(found)
-        for own in judged:
-            group, blocks = own.group, own.group.suspects
-            terms = tuple(t for t in asked.terms if any(concerns(t, b) for b in blocks))
+    entries: list[Considered] = []
+    for hypothesis in fitted.considered:
+        before = len(entries)
+        for group_judged in judged:
+            group, blocks = group_judged.group, group_judged.group.suspects
+            terms = tuple(t for t in hypothesis.terms if any(concerns(t, b) for b in blocks))
             if group.mismatch is None or not terms:
                 continue
             acting = Hypothesis(terms)
-            there = next((c for c in group.candidates if c.hypothesis == acting), None)
-            left = None
-            if there is not None:
-                left = share_left(there, group.candidates[0], blocks)
-            probability = own.probabilities.get(acting, 0.0)
-            found.append(Considered(acting.words, [b.name for b in blocks], probability, left))
-        if len(found) == before:
-            chance = max(own.probabilities.get(asked, 0.0) for own in judged)
-            found.append(Considered(asked.words, [], chance, None))
-    return found
+            candidate = next((c for c in group.candidates if c.hypothesis == acting), None)
+            share = None
+            if candidate is not None:
+                share = share_left(candidate, group.candidates[0], blocks)
+            probability = group_judged.probabilities.get(acting, 0.0)
+            entries.append(Considered(acting.words, [b.name for b in blocks], probability, share))
+        if len(entries) == before:
+            chance = max(group_judged.probabilities.get(hypothesis, 0.0) for group_judged in judged)
+            entries.append(Considered(hypothesis.words, [], chance, None))
+    return entries
 
 
 def _tested(groups: list[BlockGroup]) -> list[Tested]:
     """Every persistent effect that acts where a mismatch is, its predicted gain and what it leaves
     alone, the best first.
     """
-    found = []
+    entries = []
     for group in groups:
         for effect, predicted_gain in group.predicted_gain.items():
             singles = [c for c in group.candidates if c.effects == (effect,)]
             alone = [share_left(c, group.candidates[0], group.suspects) for c in singles]
             blocks = [b.name for b in group.suspects]
-            found.append(
+            entries.append(
                 Tested(
                     str(effect),
                     blocks,
@@ -271,7 +275,7 @@ def _tested(groups: list[BlockGroup]) -> list[Tested]:
                 )
             )
     return sorted(
-        found, key=lambda a: (a.left is None, a.left if a.left is not None else -a.predicted_gain)
+        entries, key=lambda a: (a.left is None, a.left if a.left is not None else -a.predicted_gain)
     )
 
 
@@ -287,23 +291,23 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
     """The effects that are named, the most probable first; without a name those that come
     closest.
     """
-    found: dict[Term, tuple[float, Candidate]] = {}
+    named: dict[Term, tuple[float, FittedHypothesis]] = {}
     chosen = [j.chosen for j in judged]
     owners = owners_of_effects(chosen)
     in_set = problem.settings.in_set
     for j in judged:
-        tried = dict.fromkeys(effect for c in j.group.candidates for effect in c.effects)
-        listed = [effect for effect in tried if effect.id in CATALOGUE]
+        effects = dict.fromkeys(effect for c in j.group.candidates for effect in c.effects)
+        listed = [effect for effect in effects if effect.id in CATALOGUE]
         for effect in j.named if verdict == "effects" else listed:
             p = j.probability(effect)
             if verdict == "effects":
-                first = max(p, found[effect][0] if effect in found else 0.0)
-                found[effect] = first, chosen[owners[effect]]
+                first = max(p, named[effect][0] if effect in named else 0.0)
+                named[effect] = first, chosen[owners[effect]]
             elif p >= in_set:
-                own = [c for c in j.group.candidates if effect in c.effects]
+                having = [c for c in j.group.candidates if effect in c.effects]
                 chances = j.group.probabilities
-                best = max(own, key=lambda c: (chances.get(c.hypothesis, 0.0), c.gap_closed))
-                found[effect] = p, with_stated_std(problem, j.group, best)
+                best = max(having, key=lambda c: (chances.get(c.hypothesis, 0.0), c.gap_closed))
+                named[effect] = p, with_stated_std(problem, j.group, best)
     return [
         EffectFound(
             id=effect.id,
@@ -314,33 +318,33 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
             parameters=_effect_parameters(effect, candidate),
             events=_events(effect, candidate),
         )
-        for effect, (p, candidate) in sorted(found.items(), key=lambda kv: -kv[1][0])
+        for effect, (p, candidate) in sorted(named.items(), key=lambda kv: -kv[1][0])
     ]
 
 
-def _wrong(
+def _wrong_parameters(
     models: Models, problem: Problem, table: dict[str, ChannelError]
 ) -> list[WrongParameter]:
     """Parameters that the rig file is wrong about: its value, the one that the recordings ask for,
     and what the error becomes.
     """
-    found, judged = [], models.judged
+    entries, judged = [], models.judged
     for name in dict.fromkeys(name for j in judged for name in j.wrong):
         naming = [j for j in judged if name in j.wrong]
         # of a zero that two groups have, the value is that of the group that knows it best
-        own = models.chosen[models.owners[name]].fit
+        fitted = models.chosen[models.owners[name]].fit
         known = known_parameters(models.nominal)[name]
-        value, std = own.values[name], own.std[name]
-        told = [
+        value, std = fitted.values[name], fitted.std[name]
+        telling = [
             b
             for b in problem.blocks
             if depends(b, name) and any(b in j.group.blocks for j in naming)
         ]
-        errors = {b.channel: table[b.channel] for b in told}
-        found.append(
+        errors = {b.channel: table[b.channel] for b in telling}
+        entries.append(
             WrongParameter(
                 name=name,
-                block=told[-1].name if told else None,
+                block=telling[-1].name if telling else None,
                 nominal=known.value,
                 tolerance=known.tol,
                 value=value,
@@ -354,27 +358,33 @@ def _wrong(
                 },
             )
         )
-    return found
+    return entries
 
 
-def _events(effect: Term, candidate: Candidate) -> list[dict[str, Any]]:
+def _events(effect: Term, candidate: FittedHypothesis) -> list[dict[str, Any]]:
     """Events of an effect in each recording, one entry for each event."""
     events = candidate.fit.events
     if events is None or events.effect != effect:
         return []
-    found = []
+    entries = []
     rises = [p.name for p in effect.info.with_role("rise")]
     for recording, values in events.values.items():
         for parameters in events_of(effect, events.form):
-            own = {p.repeats or p.name: values[p.name] for p in parameters if p.name in values}
-            if own:
-                found.append(
-                    {"recording": recording, **own, **{n: values[n] for n in rises if n in values}}
+            event = {p.repeats or p.name: values[p.name] for p in parameters if p.name in values}
+            if event:
+                entries.append(
+                    {
+                        "recording": recording,
+                        **event,
+                        **{n: values[n] for n in rises if n in values},
+                    }
                 )
-    return found
+    return entries
 
 
-def _effect_parameters(effect: Term, candidate: Candidate) -> dict[str, EffectParameterFound]:
+def _effect_parameters(
+    effect: Term, candidate: FittedHypothesis
+) -> dict[str, EffectParameterFound]:
     """Parameters of an effect, fitted or chosen."""
     rig = candidate.fit.rig
     unknown_volume = bool(unknown_volumes(rig))
@@ -409,7 +419,7 @@ _REFERENCE_DENSITY = 1.185
 """Density of air in the reference state of ISO 6358 [kg/m3], to which conductances refer."""
 
 
-def _emptying(effect: Term, candidate: Candidate) -> dict[str, EffectParameterFound]:
+def _emptying(effect: Term, candidate: FittedHypothesis) -> dict[str, EffectParameterFound]:
     """Time constant [s] of a sealed chamber emptying by a conductance; conductance per volume."""
     gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
     out: dict[str, EffectParameterFound] = {}
@@ -445,21 +455,21 @@ def _interval(value: float, std: float, lower: float) -> list[float]:
 
 
 def _parameters(
-    nominal: Rig, candidates: list[Candidate], owners: dict[str, int]
+    nominal: Rig, candidates: list[FittedHypothesis], owners: dict[str, int]
 ) -> dict[str, ParameterFound]:
     """Parameters of the baseline, each from the group that determines it best."""
     out: dict[str, ParameterFound] = {}
     known = known_parameters(nominal)
     for name, k in owners.items():
-        p, own = known[name], candidates[k].fit
-        moved = abs(own.values[name] - p.value)
+        p, fitted = known[name], candidates[k].fit
+        moved = abs(fitted.values[name] - p.value)
         out[name] = ParameterFound(
             nominal=p.value,
-            value=own.values[name],
-            std=own.std[name],
+            value=fitted.values[name],
+            std=fitted.std[name],
             unit=p.unit,
-            moved_sigmas=(own.values[name] - p.value) / p.tol,
-            identifiable=own.std[name] < max(DETERMINED_SHARE * p.tol, moved / _DETERMINED_MOVE),
+            moved_sigmas=(fitted.values[name] - p.value) / p.tol,
+            identifiable=fitted.std[name] < max(DETERMINED_SHARE * p.tol, moved / _DETERMINED_MOVE),
         )
     return out
 
@@ -469,9 +479,9 @@ def _block_table(groups: list[BlockGroup]) -> dict[str, BlockResidual]:
     out: dict[str, BlockResidual] = {}
     for group in groups:
         for block in group.blocks:
-            found = group.baseline[block.name]
+            excess = group.baseline[block.name]
             out[block.name] = BlockResidual(
-                found.rms, found.noise, found.systematic, found.p_value, block.channel
+                excess.rms, excess.noise, excess.systematic, excess.p_value, block.channel
             )
     return out
 
@@ -481,11 +491,11 @@ def _traces(
 ) -> list[Trace]:
     traces = []
     stock = [(fitted, inner)] if held is fitted else [(fitted, inner), (held, outer)]
-    for problem, found in stock:
+    for problem, residuals_by_stage in stock:
         for prepared in problem.recordings:
             for block in problem.blocks:
                 stages = {
-                    s: found[s][block.name, prepared.recording.name]
+                    s: residuals_by_stage[s][block.name, prepared.recording.name]
                     for s in ("before", "refit", "after")
                 }
                 shown = {s: np.where(r.rows, r.prediction, np.nan) for s, r in stages.items()}

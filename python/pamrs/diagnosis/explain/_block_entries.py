@@ -150,41 +150,41 @@ def unexplained(
     list of Unexplained
         What names leave, its share, and the verdict of the group.
     """
-    found = []
+    entries_found = []
     for j, entry in zip(judged, entries, strict=True):
         if entry.verdict == "none" or (
             entry.verdict == "parameters" and not entry.wrong_parameters
         ):
             continue
         suspects = {b.name: b for b in j.group.suspects}
-        for own in (m for m in entry.mismatch if m.block in suspects):
-            left = _left(own, entry.verdict, stages, errors)
-            if left is None:
+        for mismatch in (m for m in entry.mismatch if m.block in suspects):
+            shown = _stage_with_excess(mismatch, entry.verdict, stages, errors)
+            if shown is None:
                 continue
-            stage, problem, residual, role = left
-            error = errors[role][own.channel]
+            stage, problem, residual, role = shown
+            error = errors[role][mismatch.channel]
             size = error[stage]
-            share, interval = _rest(own.block, terms)
-            found.append(
+            share, interval = _share_unexplained(mismatch.block, terms)
+            entries_found.append(
                 Unexplained(
-                    own.block,
-                    own.channel,
-                    own.unit,
+                    mismatch.block,
+                    mismatch.channel,
+                    mismatch.unit,
                     size / error.noise,
                     size,
                     entry.verdict,
                     share,
                     interval,
-                    _conditions(suspects[own.block], problem, residual, noise_level, nominal),
-                    forms.get(own.block, "") if entry.verdict == "unlisted" else "",
+                    _conditions(suspects[mismatch.block], problem, residual, noise_level, nominal),
+                    forms.get(mismatch.block, "") if entry.verdict == "unlisted" else "",
                     role,
                 )
             )
-    return sorted(found, key=lambda u: -(u.noises or 0.0))
+    return sorted(entries_found, key=lambda u: -(u.noises or 0.0))
 
 
-def _left(
-    own: BlockMismatch,
+def _stage_with_excess(
+    mismatch: BlockMismatch,
     verdict: str,
     stages: list[tuple[Problem, Stages]],
     errors: Mapping[str, Mapping[str, ChannelError]],
@@ -192,26 +192,28 @@ def _left(
     """Stage, recordings, residuals and role that show what a block keeps; None if only noise."""
     # a form without a name takes up what no name explains, and is no explanation
     stage = "refit" if verdict == "unlisted" else "after"
-    parts = {"held_out": own, "fit": replace(own, held_out=None)}
-    if own.held_out is None:
+    parts = {"held_out": mismatch, "fit": replace(mismatch, held_out=None)}
+    if mismatch.held_out is None:
         del parts["held_out"]
     for (role, part), (problem, residuals) in zip(parts.items(), stages, strict=True):
-        if left_of(part, errors[role][own.channel], stage) == "more":
+        if left_of(part, errors[role][mismatch.channel], stage) == "more":
             return stage, problem, residuals[stage], role
     return None
 
 
-def _rest(block: str, terms: list[BudgetTerm]) -> tuple[float | None, list[float] | None]:
+def _share_unexplained(
+    block: str, terms: list[BudgetTerm]
+) -> tuple[float | None, list[float] | None]:
     """Share of a block's excess that no name takes, and its interval; None without a budget."""
-    own = [t for t in terms if t.block == block]
-    rest = [t for t in own if t.kind in ("form", "unexplained")]
+    of_block = [t for t in terms if t.block == block]
+    rest = [t for t in of_block if t.kind in ("form", "unexplained")]
     if not rest:
         return None, None
     share = sum(t.share for t in rest)
     if len(rest) == 1:
         return share, rest[0].interval
     # only parameters stand before a form without a name, and the shares of every draw add up to 1
-    low, high = own[0].interval
+    low, high = of_block[0].interval
     return share, [1.0 - high, 1.0 - low]
 
 

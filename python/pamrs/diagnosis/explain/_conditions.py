@@ -126,7 +126,7 @@ def describe(
     block: Block,
     recordings: list[Prepared],
     rig: Rig,
-    found: dict[Key, Any],
+    residuals: dict[Key, Any],
     noise_level: dict[Key, NoiseLevel],
 ) -> Picture:
     """Shares of the excess by condition, and intervals in the worst recording.
@@ -139,7 +139,7 @@ def describe(
         Recordings.
     rig : Rig
         Nominal model, for the valve's null.
-    found : dict
+    residuals : dict
         Residuals of a model.
     noise_level : dict
         Noise levels.
@@ -149,14 +149,14 @@ def describe(
     for prepared in recordings:
         key = (block.name, prepared.recording.name)
         width = bins_of(prepared)
-        means, counts = binned(found[key].value, found[key].rows, width)
+        means, counts = binned(residuals[key].value, residuals[key].rows, width)
         ok = counts > 0
         # inside a window the residual is an integral: its change says where the cause acts
         score = means / noise_level[key].binned
         cause = (
             score
             if block.window is None
-            else _change(found[key].value, found[key].rows, width) / noise_level[key].binned
+            else _change(residuals[key].value, residuals[key].rows, width) / noise_level[key].binned
         )
         conditions = _conditions(block, prepared, rig, width)
         for name, values in conditions.items():
@@ -183,10 +183,14 @@ def _shares(regimes: dict[str, Mask], z: Array, *, rising: bool) -> list[Conditi
     first: no bin is counted twice, so that shares add up to at most all of it.
     """
     excess = np.maximum(z**2 - 1.0, 0.0)
-    total, found = float(np.sum(excess)), list[Condition]()
+    total, conditions = float(np.sum(excess)), list[Condition]()
     rest, waiting = np.ones(z.size, dtype=bool), dict(regimes)
     while total > 0.0:
-        waiting = {name: own for name, mask in waiting.items() if (own := mask & rest).sum() >= 10}
+        waiting = {
+            name: remaining
+            for name, mask in waiting.items()
+            if (remaining := mask & rest).sum() >= 10
+        }
         if not waiting:
             break
 
@@ -198,11 +202,11 @@ def _shares(regimes: dict[str, Mask], z: Array, *, rising: bool) -> list[Conditi
         rest &= ~mask
         share, time = float(np.sum(excess[mask])) / total, float(mask.mean())
         text = (
-            f"{'otherwise ' if found else ''}{name}: {100 * share:.0f} % of the excess over the "
-            f"noise, in {100 * time:.0f} % of the time{_sign(z[mask], rising=rising)}"
+            f"{'otherwise ' if conditions else ''}{name}: {100 * share:.0f} % of the excess over "
+            f"the noise, in {100 * time:.0f} % of the time{_sign(z[mask], rising=rising)}"
         )
-        found.append(Condition(name, share, time, float(z[mask].mean()), text))
-    return found
+        conditions.append(Condition(name, share, time, float(z[mask].mean()), text))
+    return conditions
 
 
 _ONE_SIDED = 0.5

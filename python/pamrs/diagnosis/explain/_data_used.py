@@ -64,14 +64,14 @@ def data_used(
     """
     needed = {name for block in blocks for name in (block.channel, *block.drives)}
     needed |= set(core.inputs)
-    found = []
+    used = []
     for recording, count in zip(recordings, counts, strict=True):
         unused = {
             name: _why(name, rig, core, unjudged)
             for name in recording.channels
             if name not in needed and channel_of(name) not in (AMBIENT, AMBIENT_PRESSURE)
         }
-        found.append(
+        used.append(
             RecordingUsed(
                 recording=recording.name,
                 role=recording.role,
@@ -86,7 +86,7 @@ def data_used(
                     for name, mask in recording.mask.items()
                     if (share := float(np.mean(~mask))) > 0.0
                 },
-                parameters={name: own.value for name, own in recording.parameters.items()},
+                parameters={name: value.value for name, value in recording.parameters.items()},
                 read=[
                     issue.text if issue.channel == "time" else f"{issue.channel}: {issue.text}"
                     for issue in recording.issues
@@ -94,7 +94,7 @@ def data_used(
                 ],
             )
         )
-    return found
+    return used
 
 
 def _why(name: str, rig: Rig, core: _core.Rig, unjudged: Sequence[Unjudged]) -> str:
@@ -107,7 +107,7 @@ def _why(name: str, rig: Rig, core: _core.Rig, unjudged: Sequence[Unjudged]) -> 
     if name in core.channels or name in core.inputs:
         names = ", ".join(block.name for block in unjudged)
         return "no block that is judged needs it" + f"; not judged: {names}" * bool(names)
-    there = rig.tables(table) if table else {}
-    if table and (not rig.model.get(table) or (block and block not in there)):
+    blocks = rig.tables(table) if table else {}
+    if table and (not rig.model.get(table) or (block and block not in blocks)):
         return f"the rig has no block [{table}{'.' + block if block else ''}]"
     return f"no block of the model has a {kind.replace('_', ' ')} to compare it with"

@@ -11,7 +11,7 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.diagnosis.fit import Fit, Problem
-from pamrs.diagnosis.prepare import Block, begun
+from pamrs.diagnosis.prepare import Block, signals_at_starts
 from pamrs.effects import CLOSURE_OF, CLOSURE_TERMS, EFFECTS, MEMORY_OF, WORDS, ClosureTerm
 from pamrs.errors import DiagnosisError
 from pamrs.findings import Form
@@ -53,20 +53,20 @@ def forms_of(found: Fit, problem: Problem, baseline: Fit) -> list[Form]:
     return [_form(found, problem, baseline, block) for block in blocks]
 
 
-def _form(found: Fit, problem: Problem, baseline: Fit, block: Block) -> Form:
+def _form(fitted: Fit, problem: Problem, baseline: Fit, block: Block) -> Form:
     closure = CLOSURE_OF[block.kind]
-    parts = _parts(found, problem, block, closure)
-    used = [term for term in CLOSURE_TERMS[closure] if f"{closure}.{term.name}" in found.values]
+    parts = _parts(fitted, problem, block, closure)
+    used = [term for term in CLOSURE_TERMS[closure] if f"{closure}.{term.name}" in fitted.values]
     whole = np.sum([parts[term.name] for term in used], axis=0)
     power = float(whole @ whole)
-    effect = next(own for own in found.rig.effects if own["id"] == closure)
+    effect = next(entry for entry in fitted.rig.effects if entry["id"] == closure)
     return Form(
         block=block.name,
         covers=block.covers,
         closure=closure,
         effective=math.sqrt(power / max(1, whole.size)),
         largest=float(np.quantile(np.abs(whole), 0.99)) if whole.size else 0.0,
-        taken=_taken(found, baseline, problem, block),
+        taken=_taken(fitted, baseline, problem, block),
         shares={
             kind: sum(float(parts[t.name] @ whole) for t in used if t.kind == kind) / power
             if power
@@ -75,15 +75,15 @@ def _form(found: Fit, problem: Problem, baseline: Fit, block: Block) -> Form:
         },
         memory={kind: effect["parameters"].get(name) for kind, name in MEMORY_OF.items()},
         terms={
-            t.name: (found.values[f"{closure}.{t.name}"], found.std[f"{closure}.{t.name}"])
+            t.name: (fitted.values[f"{closure}.{t.name}"], fitted.std[f"{closure}.{t.name}"])
             for t in used
         },
     )
 
 
-def _parts(found: Fit, problem: Problem, block: Block, closure: str) -> dict[str, Array]:
+def _parts(fitted: Fit, problem: Problem, block: Block, closure: str) -> dict[str, Array]:
     """Each term times its coefficient over all usable rows, along the measured signals."""
-    core = core_rig(found.rig, problem.core)
+    core = core_rig(fitted.rig, problem.core)
     rows = []
     for prepared in problem.recordings:
         starts = prepared.starts(block.window, block.drives)
@@ -93,28 +93,28 @@ def _parts(found: Fit, problem: Problem, block: Block, closure: str) -> dict[str
             prepared.dt,
             default_step(prepared.dt, longest=block.step),
             starts,
-            begun(block, prepared, starts),
+            signals_at_starts(block, prepared, starts),
             prepared.n,
         )
-        rows.append(terms[found.residuals[block.name, prepared.recording.name].rows])
+        rows.append(terms[fitted.residuals[block.name, prepared.recording.name].rows])
     every = np.concatenate(rows)
     return {
-        t.name: every[:, k] * found.values.get(f"{closure}.{t.name}", 0.0)
+        t.name: every[:, k] * fitted.values.get(f"{closure}.{t.name}", 0.0)
         for k, t in enumerate(CLOSURE_TERMS[closure])
     }
 
 
-def _taken(found: Fit, baseline: Fit, problem: Problem, block: Block) -> float:
+def _taken(fitted: Fit, baseline: Fit, problem: Problem, block: Block) -> float:
     """Share of a block's squared residual beyond its sample noise that the closure removes."""
-    left = []
-    for model in (baseline, found):
+    excesses = []
+    for model in (baseline, fitted):
         pairs = [model.residuals[block.name, p.recording.name] for p in problem.recordings]
-        left.append(
+        excesses.append(
             sum(
                 float(((r.value[r.rows] / r.noise) ** 2).sum()) - float(r.rows.sum()) for r in pairs
             )
         )
-    return 1.0 - max(0.0, left[1]) / left[0] if left[0] > 0.0 else 0.0
+    return 1.0 - max(0.0, excesses[1]) / excesses[0] if excesses[0] > 0.0 else 0.0
 
 
 _SPOKEN_SHARE = 0.05  # share of the form from which a kind of dependence is put into words
@@ -141,7 +141,7 @@ def form_sentence(form: Form) -> str:
         which shares are even and odd, instantaneous or with memory, and the form with its numbers
         and standard deviations.
     """
-    closure, told, shape = form.closure, WORDS[form.closure], form.memory
+    closure, wording, shape = form.closure, WORDS[form.closure], form.memory
     used = {term.name: term for term in CLOSURE_TERMS[closure] if term.name in form.terms}
     size, unit = _readable(form.effective, EFFECTS[closure].parameters[0].unit)
     variables = list(dict.fromkeys(v for term in used.values() for v in term.variables))
@@ -151,12 +151,12 @@ def form_sentence(form: Form) -> str:
         if abs(form.shares.get(kind, 0.0)) > _SPOKEN_SHARE
     ]
     return (
-        f"In the block {form.block} ({form.covers}) a {told.what} is missing, "
+        f"In the block {form.block} ({form.covers}) a {wording.what} is missing, "
         f"{form.effective / size:.3g} {unit} effective (99 % below {form.largest / size:.3g} "
         f"{unit}); it takes {_percent(form.taken)} of the mismatch there. It is a function of "
         f"{listed(variables or ['nothing: it is constant'])}: {listed(words) or 'nothing'}. "
-        f"{told.letter} = {_formula(form, used, size)} {unit} "
-        f"({told.symbols}{_legend(used, shape)})."
+        f"{wording.letter} = {_formula(form, used, size)} {unit} "
+        f"({wording.symbols}{_legend(used, shape)})."
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pamrs.channels import channel_of, unit_of
-from pamrs.diagnosis.evidence import Candidate, Judged, parameters_at_wall
+from pamrs.diagnosis.evidence import FittedHypothesis, Judged, parameters_at_wall
 from pamrs.diagnosis.explain._conditions import Picture
 from pamrs.diagnosis.fit import Problem, concerns
 from pamrs.diagnosis.model import spoiled_channels
@@ -202,21 +202,21 @@ def warnings(
 def absolute(case: Case) -> list[str]:
     """Warnings of muscle pressures that begin at one atmosphere in every recording."""
     ambient = float(case.rig.model["gas"]["ambient_pressure"])
-    firsts, said = dict[str, list[float]](), dict[str, str]()
+    firsts, units = dict[str, list[float]](), dict[str, str]()
     for recording in case.recordings:
         for channel, values in recording.channels.items():
             rows = recording.mask[channel]
             if channel_of(channel) == "muscle_pressure" and rows.any():
-                said[channel] = recording.said.get(channel, "")
+                units[channel] = recording.said.get(channel, "")
                 firsts.setdefault(channel, []).append(float(values[rows][0]))
     return [
-        f"{channel} begins at {in_words(said[channel], 'Pa', float(np.mean(begun)))} in every "
-        "recording, one atmosphere (gas.ambient_pressure = "
+        f"{channel} begins at {in_words(units[channel], 'Pa', float(np.mean(first_values)))} in "
+        "every recording, one atmosphere (gas.ambient_pressure = "
         f"{case.rig.units.said('gas.ambient_pressure', 'Pa', ambient, digits='.6g')}): are these "
         "absolute pressures? Gauge pressures are needed; what is found below may be no more than "
         "the difference"
-        for channel, begun in firsts.items()
-        if all(abs(first - ambient) < _AMBIENT_SHARE * ambient for first in begun)
+        for channel, first_values in firsts.items()
+        if all(abs(first - ambient) < _AMBIENT_SHARE * ambient for first in first_values)
     ]
 
 
@@ -235,7 +235,7 @@ def worse(table: dict[str, ChannelError]) -> list[str]:
     return out
 
 
-def reservations(chosen: list[Candidate]) -> list[str]:
+def reservations(chosen: list[FittedHypothesis]) -> list[str]:
     """Warnings of parameters that a fit with a named effect moved far."""
     named = [c for c in chosen if any(effect.id in CATALOGUE for effect in c.effects)]
     moved = {

@@ -15,7 +15,7 @@ is known of all parameters); `ends_in_tolerances`,
 (standard deviations of coloured residuals).
 """
 
-from pamrs.diagnosis.fit._acting import (
+from pamrs.diagnosis.fit._effect_places import (
     acts_in,
     concerns,
     depends,
@@ -46,7 +46,7 @@ from pamrs.diagnosis.fit._fitting import (
     two_at_a_time,
     with_priors,
 )
-from pamrs.diagnosis.fit._held import (
+from pamrs.diagnosis.fit._known_parameters import (
     ends_in_tolerances,
     holdable,
     known_parameters,

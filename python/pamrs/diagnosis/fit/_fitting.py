@@ -17,8 +17,8 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array
 from pamrs._losses import Losses
-from pamrs.diagnosis.fit._acting import acts_in, core_names, depends
-from pamrs.diagnosis.fit._held import (
+from pamrs.diagnosis.fit._effect_places import acts_in, core_names, depends
+from pamrs.diagnosis.fit._known_parameters import (
     ends_in_tolerances,
     in_tolerances,
     known_parameters,
@@ -167,10 +167,10 @@ class Events:
 
     def put_into(self, rig: Rig, recording: str) -> Rig:
         """Rig with the events of one recording, and without the effect where nothing happened."""
-        own = self.values.get(recording)
+        values = self.values.get(recording)
         rig = without_term(rig, self.effect)
         at = self.effect.at
-        return rig.with_effect(self.effect.id, own, at=at, form=self.form) if own else rig
+        return rig.with_effect(self.effect.id, values, at=at, form=self.form) if values else rig
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,8 +276,8 @@ def residuals(
     def models(rig: Rig) -> dict[str, _core.Rig]:
         """The compiled rig in each recording, with what happens there."""
         core = _compiled(problem, rig)
-        own = {n: _compiled(problem, events.put_into(rig, n)) for n in happened if events}
-        return dict.fromkeys(recordings, core) | own
+        with_events = {n: _compiled(problem, events.put_into(rig, n)) for n in happened if events}
+        return dict.fromkeys(recordings, core) | with_events
 
     cores = models(rig)
     steps = _steps(rig, cores, names)
@@ -286,33 +286,33 @@ def residuals(
         for name, step in steps.items()
     }
 
-    def one(block: Block, prepared: Prepared) -> Residual:
+    def residual_of(block: Block, prepared: Prepared) -> Residual:
         relevant = [name for name in names if depends(block, name)]
         at = prepared.recording.name
         if events is not None and at not in happened:  # nothing here could be differentiated
             relevant = [name for name in relevant if effect_of(name) != events.effect]
-        told = [name for name in relevant if name not in steps]
-        found = residual(block, cores[at], prepared, core_names(rig, told))
-        if told == list(names):
-            return found
-        full = np.zeros((found.value.size, len(names)))
-        if told:
-            full[:, [list(names).index(name) for name in told]] = found.jacobian
-        for name in set(relevant) - set(told):
-            there = change(block, shifted[name][at], prepared, found)
-            full[:, list(names).index(name)] = (found.value - there) / steps[name]
-        return replace(found, jacobian=full)
+        in_core = [name for name in relevant if name not in steps]
+        block_residual = residual(block, cores[at], prepared, core_names(rig, in_core))
+        if in_core == list(names):
+            return block_residual
+        full = np.zeros((block_residual.value.size, len(names)))
+        if in_core:
+            full[:, [list(names).index(name) for name in in_core]] = block_residual.jacobian
+        for name in set(relevant) - set(in_core):
+            shifted_value = change(block, shifted[name][at], prepared, block_residual)
+            full[:, list(names).index(name)] = (block_residual.value - shifted_value) / steps[name]
+        return replace(block_residual, jacobian=full)
 
-    return _everywhere(problem, one)
+    return _for_every_block(problem, residual_of)
 
 
 def _steps(rig: Rig, cores: Mapping[str, _core.Rig], names: Sequence[str]) -> dict[str, float]:
     """Finite-difference step of each parameter to which the core has no sensitivities [SI]."""
-    told, known = {n for core in cores.values() for n in core.parameter_names}, rig.parameters
+    in_core, known = {n for core in cores.values() for n in core.parameter_names}, rig.parameters
     return {
         name: shift if known[name].value + shift <= known[name].upper else -shift
         for name in names
-        if name in known and name not in told
+        if name in known and name not in in_core
         for shift in [_shift(known[name])]
     }
 
@@ -333,7 +333,7 @@ def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> l
         return list(pool.map(function, items))
 
 
-def _everywhere(problem: Problem, one: Callable[[Block, Prepared], Residual]) -> Residuals:
+def _for_every_block(problem: Problem, one: Callable[[Block, Prepared], Residual]) -> Residuals:
     """Apply a function to every block and recording, two at a time.
 
     The longest come first, so that no processor is left alone with one of them at the end.
@@ -354,8 +354,8 @@ def _everywhere(problem: Problem, one: Callable[[Block, Prepared], Residual]) ->
 
     longest_first = sorted(tasks, key=steps, reverse=True)
     with _inside_range():
-        found = dict(zip(longest_first, two_at_a_time(run, longest_first), strict=True))
-    return {key: found[key] for key in tasks}
+        results = dict(zip(longest_first, two_at_a_time(run, longest_first), strict=True))
+    return {key: results[key] for key in tasks}
 
 
 @contextmanager
@@ -427,16 +427,16 @@ class Scaling:
                 lower.append(max(info.lower, -most) / self.scale[name])
                 upper.append(most / self.scale[name])
         self.bounds = (np.array(lower), np.array(upper))
-        begun = [0.0 if _logarithmic(n) else s / self.scale[n] for n, s in starts.items()]
-        self.start = np.clip(np.array([0.0] * len(self.baseline) + begun), *self.bounds)
+        effect_starts = [0.0 if _logarithmic(n) else s / self.scale[n] for n, s in starts.items()]
+        self.start = np.clip(np.array([0.0] * len(self.baseline) + effect_starts), *self.bounds)
 
     def value(self, name: str, x: float) -> float:
         """A parameter [SI] from its scaled number."""
         if name in self.centre:
             return moved_value(self.known[name], x)
         info, most = find_parameter(name), self.most[name]
-        found = self.starts[name] * math.exp(x) if _logarithmic(name) else x * self.scale[name]
-        return min(max(found, info.lower, -most), most)
+        value = self.starts[name] * math.exp(x) if _logarithmic(name) else x * self.scale[name]
+        return min(max(value, info.lower, -most), most)
 
     def slope(self, name: str, x: float) -> float:
         """Change of a parameter [SI] with its scaled number."""
@@ -461,7 +461,7 @@ def bin_width(prepared: Prepared, seconds: float) -> int:
 
 
 def stacked(
-    problem: Problem, found: Residuals, inflation: dict[str, float]
+    problem: Problem, block_residuals: Residuals, inflation: dict[str, float]
 ) -> tuple[Array, Array | None]:
     """Residuals of all blocks and recordings as one vector of bin means in units of their standard
     deviation.
@@ -470,7 +470,7 @@ def stacked(
     ----------
     problem : Problem
         Blocks and recordings.
-    found : dict
+    block_residuals : dict
         Their residuals.
     inflation : dict of str to float
         As in :func:`fit`.
@@ -482,13 +482,13 @@ def stacked(
         Derivative of the rows with respect to each parameter, SI; None without parameters.
     """
     rows, slopes = [], []
-    own = inflation.apart if isinstance(inflation, Weights) else {}
+    apart = inflation.apart if isinstance(inflation, Weights) else {}
     for prepared in problem.recordings:
         for block in problem.blocks:
             key = block.name, prepared.recording.name
-            r = found[key]
+            r = block_residuals[key]
             mean, counts = binned(r.value, r.rows, bin_width(prepared, FIT_BIN_TIME))
-            variance = own.get(key, inflation[block.name])
+            variance = apart.get(key, inflation[block.name])
             weight = np.sqrt(counts) / (r.noise * math.sqrt(variance))
             rows.append(mean * weight)
             if r.jacobian is not None:
@@ -497,7 +497,7 @@ def stacked(
     return np.concatenate(rows), np.concatenate(slopes) if slopes else None
 
 
-def predicted_with_doubt(problem: Problem, found: Fit) -> Residuals:
+def predicted_with_doubt(problem: Problem, fitted: Fit) -> Residuals:
     """Residuals of recordings that were not fitted, without what the uncertainty of the fit's
     parameters may explain of them.
 
@@ -509,7 +509,7 @@ def predicted_with_doubt(problem: Problem, found: Fit) -> Residuals:
     ----------
     problem : Problem
         Recordings that were not fitted.
-    found : Fit
+    fitted : Fit
         A fit that leaves noise in those that were: its covariance then means what it says.
 
     Returns
@@ -517,33 +517,33 @@ def predicted_with_doubt(problem: Problem, found: Fit) -> Residuals:
     dict of (block, recording) to Residual
         Without sensitivities.
     """
-    names = list(found.values)
-    there = residuals(problem, found.rig, names, found.events)
-    rows, slope = stacked(problem, there, found.inflation)
+    names = list(fitted.values)
+    with_slopes = residuals(problem, fitted.rig, names, fitted.events)
+    rows, slope = stacked(problem, with_slopes, fitted.inflation)
     if slope is None:
-        return there
-    scales = np.array([found.scales[name] for name in names])
+        return with_slopes
+    scales = np.array([fitted.scales[name] for name in names])
     scaled = slope * scales
-    doubt = found.covariance
+    doubt = fitted.covariance
     moved = -np.linalg.solve(
         np.eye(len(names)) + doubt @ (scaled.T @ scaled), doubt @ (scaled.T @ rows)
     )
-    left = rows + scaled @ moved
-    power = float(left @ left)
+    rest = rows + scaled @ moved
+    power = float(rest @ rest)
     # at the best values the sum of both is what the movement takes off
     both = float(rows @ rows + rows @ (scaled @ moved))
     size = math.sqrt(max(both, power) / power) if power > 0.0 else 1.0
     return {
         key: replace(r, value=size * (r.value - r.jacobian @ (scales * moved)), jacobian=None)
-        for key, r in there.items()
+        for key, r in with_slopes.items()
         if r.jacobian is not None
     }
 
 
-def with_priors(problem: Problem, found: Fit, inflation: dict[str, float]) -> float:
+def with_priors(problem: Problem, fitted: Fit, inflation: dict[str, float]) -> float:
     """Sum of squares of a fit's stacked residuals and priors under a weighting of its own."""
-    rows, _ = stacked(problem, found.residuals, inflation)
-    return float(rows @ rows) + found.strain
+    rows, _ = stacked(problem, fitted.residuals, inflation)
+    return float(rows @ rows) + fitted.strain
 
 
 def changes(
@@ -566,15 +566,15 @@ def changes(
     """
     core = _compiled(problem, rig)
 
-    def one(block: Block, prepared: Prepared) -> Residual:
-        was = base[block.name, prepared.recording.name]
+    def changed(block: Block, prepared: Prepared) -> Residual:
+        before = base[block.name, prepared.recording.name]
         if not acts_in(effect, block):
-            return replace(was, jacobian=None)
+            return replace(before, jacobian=None)
         if known and (block.name, prepared.recording.name) in known:
             return known[block.name, prepared.recording.name]
-        return replace(was, value=change(block, core, prepared, was), jacobian=None)
+        return replace(before, value=change(block, core, prepared, before), jacobian=None)
 
-    return _everywhere(problem, one)
+    return _for_every_block(problem, changed)
 
 
 def _away_from_usual(
@@ -651,8 +651,8 @@ def fit(
     """
     nominal = with_known(nominal, settled or {})
     baseline = [name for name in free_baseline(problem, nominal) if name not in (settled or {})]
-    own = problem.settings
-    scaling = Scaling(nominal, baseline, starts, own, freed, forms)
+    settings = problem.settings
+    scaling = Scaling(nominal, baseline, starts, settings, freed, forms)
     count = len(baseline)
     bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
     prior = np.zeros((count, len(scaling.names)))
@@ -663,29 +663,29 @@ def fit(
 
     def evaluate(x: Array) -> tuple[Array, Array, Residuals]:
         try:
-            found = residuals(problem, scaling.rig(x, fixed or {}), scaling.names, events)
+            block_residuals = residuals(problem, scaling.rig(x, fixed or {}), scaling.names, events)
         except SimulationError as error:
             refused.append(error)
             raise
         refused.append(None)
-        rows, slope = stacked(problem, found, inflation)
+        rows, slope = stacked(problem, block_residuals, inflation)
         slopes = np.array(
             [scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)]
         )
         jacobian = np.zeros((rows.size, 0)) if slope is None else slope * slopes
-        own_rows, own_slopes = _away_from_usual(scaling, usual, x, slopes)
+        usual_rows, usual_slopes = _away_from_usual(scaling, usual, x, slopes)
         return (
-            np.concatenate([rows, bound * x[:count], own_rows]),
-            np.concatenate([jacobian, prior, own_slopes]),
-            found,
+            np.concatenate([rows, bound * x[:count], usual_rows]),
+            np.concatenate([jacobian, prior, usual_slopes]),
+            block_residuals,
         )
 
     start = scaling.start.copy()
     for index, name in enumerate(baseline):
         if warm is not None and name in warm.values:
             start[index] = in_tolerances(scaling.known[name], warm.values[name])
-    limit = own.fit_evaluations if evaluations is None else evaluations
-    x, (values, jacobian, found), spent = levenberg_marquardt(
+    limit = settings.fit_evaluations if evaluations is None else evaluations
+    x, (values, jacobian, block_residuals), spent = levenberg_marquardt(
         evaluate, start, scaling.bounds, limit, share
     )
     covariance: Array = np.zeros((0, 0))
@@ -698,8 +698,8 @@ def fit(
     scales = {n: scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
     std = {n: float(s) * scales[n] for n, s in zip(scaling.names, spread, strict=True)}
     # what no residual depends on is not known, although the inverse calls it zero
-    untold = zip(scaling.names, np.any(jacobian, axis=0).tolist(), strict=True)
-    std |= {n: math.inf for n, told in untold if not told}
+    dependence = zip(scaling.names, np.any(jacobian, axis=0).tolist(), strict=True)
+    std |= {n: math.inf for n, depends in dependence if not depends}
     moved = {n: float(v) for n, v in zip(baseline, x[:count], strict=True)}
     rig = scaling.rig(x, fixed or {})
     loose = tuple(name for name in baseline if name in freed)
@@ -710,7 +710,7 @@ def fit(
         std,
         covariance,
         0.5 * float(values @ values),
-        found,
+        block_residuals,
         moved,
         spent,
         scales,

@@ -75,15 +75,15 @@ def levenberg_marquardt(
 
     def evaluated(x: Array) -> tuple[tuple[Array, Array, T], Array, Array]:
         """Evaluate a point and form its normal equations."""
-        found = evaluate(x)
-        rows, jacobian, _ = found
+        evaluation = evaluate(x)
+        rows, jacobian, _ = evaluation
         # squares that overflow, or will, are outside the range as much as what is no number
         with np.errstate(over="ignore", invalid="ignore"):
             gradient, normal = jacobian.T @ rows, jacobian.T @ jacobian
             known = float(np.trace(normal) + rows @ rows) < _MOST_SQUARES
         if not known:
             raise SimulationError("the model's sensitivities are too large to be fitted")
-        return found, gradient, normal
+        return evaluation, gradient, normal
 
     least = _STEP_SHARE if share is None else share
     x = np.clip(start, low, high)
@@ -104,17 +104,17 @@ def levenberg_marquardt(
         late = reached[-1 - _STALL_EVALUATIONS :]
         if gain < worth or (len(late) > _STALL_EVALUATIONS and late[0] - late[-1] < worth):
             break
-        tried = np.clip(x + step, low, high)
+        candidate = np.clip(x + step, low, high)
         spent += 1
         try:
-            found, *equations = evaluated(tried)
+            evaluation, *equations = evaluated(candidate)
         except SimulationError:
             damping = max(10.0 * hard, 1e-2)
             continue
         reached.append(reached[-1])
-        gained = float(rows @ rows - found[0] @ found[0])
+        gained = float(rows @ rows - evaluation[0] @ evaluation[0])
         if gained > 0.0:
-            x, best, reached[-1] = tried, found, reached[-1] - gained
+            x, best, reached[-1] = candidate, evaluation, reached[-1] - gained
             gradient, normal = equations
             damping = (
                 damping * 0.1

@@ -17,7 +17,7 @@ import numpy as np
 from pamrs._arrays import Array, Index
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit._fitting import Problem, fit, free_baseline, residuals
-from pamrs.diagnosis.fit._held import known_parameters
+from pamrs.diagnosis.fit._known_parameters import known_parameters
 from pamrs.diagnosis.prepare import Block, Prepared, change
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -69,7 +69,7 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
     -------
     problems : list of Problem
         The same, with the commands of some recordings moved.
-    said : list of str
+    notes : list of str
         Which, in words.
     """
     first = problems[0]
@@ -84,58 +84,60 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
     whole = replace(first, blocks=blocks, recordings=recordings)
     try:
         # offsets are small and linear, parameters inside wide tolerances are not
-        near = _near(first, blocks, nominal)
+        near = _fitted_model(first, blocks, nominal)
         moved, offsets = _moved_alike(whole, near)
         if moved:
             moved |= _moved_each(whole, near, list(moved))
-            moved = _that_pay(first, whole, near, moved)
+            moved = _worth_moving(first, whole, near, moved)
     except SimulationError:
         return list(problems), []  # the fit says what cannot be predicted
-    said = [
+    notes = [
         f"recording {recordings[k].recording.name}: its commands act {abs(offset):.2f} of a sample "
         f"of the log {'later' if offset > 0 else 'earlier'} than it has them, as if two clocks "
         "wrote it; they were moved so far"
         for k, offset in offsets.items()
         if k in moved
     ]
-    there = {recordings[k].recording.name: p for k, p in moved.items()}
+    by_name = {recordings[k].recording.name: p for k, p in moved.items()}
     return [
-        replace(q, recordings=[there.get(p.recording.name, p) for p in q.recordings])
+        replace(q, recordings=[by_name.get(p.recording.name, p) for p in q.recordings])
         for q in problems
-    ], said
+    ], notes
 
 
-def _near(problem: Problem, blocks: Sequence[Block], nominal: Rig) -> Rig:
+def _fitted_model(problem: Problem, blocks: Sequence[Block], nominal: Rig) -> Rig:
     """The model with its parameters fitted to some blocks."""
-    own = replace(problem, blocks=list(blocks))
-    return fit(own, nominal, (), {}, {b.name: 1.0 for b in blocks}).rig
+    part = replace(problem, blocks=list(blocks))
+    return fit(part, nominal, (), {}, {b.name: 1.0 for b in blocks}).rig
 
 
-def _that_pay(
+def _worth_moving(
     first: Problem, whole: Problem, near: Rig, moved: dict[int, Prepared]
 ) -> dict[int, Prepared]:
     """Moved recordings of which a fit leaves less than unmoved, and little but noise: where
     something else is missing, an offset takes a part of that.
     """
-    there = {whole.recordings[k].recording.name: p for k, p in moved.items()}
-    fitted = [there.get(p.recording.name, p) for p in first.recordings]
-    after = _near(replace(first, recordings=fitted), whole.blocks, near)
+    by_name = {whole.recordings[k].recording.name: p for k, p in moved.items()}
+    fitted = [by_name.get(p.recording.name, p) for p in first.recordings]
+    after = _fitted_model(replace(first, recordings=fitted), whole.blocks, near)
     recordings = [moved.get(k, p) for k, p in enumerate(whole.recordings)]
-    tried = replace(whole, recordings=recordings)
-    missed, left = _missed(whole, near), _missed(tried, after)
+    with_moved = replace(whole, recordings=recordings)
+    missed, rest = _misfits(whole, near), _misfits(with_moved, after)
     return {
         k: p
         for k, p in moved.items()
-        if left[k][0] < missed[k][0] - _OFFSET_STDS**2 and left[k][0] < _OFFSET_LEFT * left[k][1]
+        if rest[k][0] < missed[k][0] - _OFFSET_STDS**2 and rest[k][0] < _OFFSET_LEFT * rest[k][1]
     }
 
 
-def _missed(problem: Problem, rig: Rig) -> list[tuple[float, int]]:
+def _misfits(problem: Problem, rig: Rig) -> list[tuple[float, int]]:
     """Sum of squares of each recording's residuals in noise levels, and their number."""
-    found, sums = residuals(problem, rig, []), []
+    block_residuals, sums = residuals(problem, rig, []), []
     for prepared in problem.recordings:
-        own = [found[block.name, prepared.recording.name] for block in problem.blocks]
-        missed = [r.value[r.rows] / r.noise for r in own]
+        of_recording = [
+            block_residuals[block.name, prepared.recording.name] for block in problem.blocks
+        ]
+        missed = [r.value[r.rows] / r.noise for r in of_recording]
         sums.append((sum(float(v @ v) for v in missed), sum(v.size for v in missed)))
     return sums
 
@@ -146,7 +148,7 @@ def _changes(prepared: Prepared) -> Rows:
     return np.flatnonzero(np.any(np.diff(each) != 0.0, axis=0)) + 1
 
 
-def _later(prepared: Prepared, shares: Array) -> Prepared:
+def _with_later_commands(prepared: Prepared, shares: Array) -> Prepared:
     """Recording whose changes of a command act given shares of a sample of the log later."""
     at = _changes(prepared)
     size = next(iter(prepared.held.values())).size
@@ -170,7 +172,7 @@ def _moved_alike(problem: Problem, nominal: Rig) -> tuple[dict[int, Prepared], d
         for k, p in enumerate(problem.recordings)
         if (at := _changes(p)).size
     ]
-    best, spread = _fitted(problem, nominal, all_of)
+    best, spread = _fit_offsets(problem, nominal, all_of)
     offsets = {
         change.recording: float(offset)
         for change, offset, std in zip(all_of, best, spread, strict=True)
@@ -178,7 +180,7 @@ def _moved_alike(problem: Problem, nominal: Rig) -> tuple[dict[int, Prepared], d
     }
     recordings = problem.recordings
     return {
-        k: _later(recordings[k], np.full(_changes(recordings[k]).size, offset))
+        k: _with_later_commands(recordings[k], np.full(_changes(recordings[k]).size, offset))
         for k, offset in offsets.items()
     }, offsets
 
@@ -190,36 +192,40 @@ def _moved_each(problem: Problem, nominal: Rig, those: list[int]) -> dict[int, P
     each = [_Change(k, np.array([i])) for k, n in few.items() for i in range(n)]
     if not each:
         return {}
-    best, _ = _fitted(problem, nominal, each)
+    best, _ = _fit_offsets(problem, nominal, each)
     shares = {k: np.zeros(n) for k, n in few.items()}
     for one, offset in zip(each, best, strict=True):
         shares[one.recording][one.which] = np.clip(offset, -_MOST_OFFSET, _MOST_OFFSET)
-    return {k: _later(problem.recordings[k], own) for k, own in shares.items()}
+    return {
+        k: _with_later_commands(problem.recordings[k], shares_of) for k, shares_of in shares.items()
+    }
 
 
-def _fitted(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[Array, Array]:
+def _fit_offsets(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[Array, Array]:
     """Offsets in samples of the log, and their standard deviations, by a linear fit together with
     the parameters inside their tolerances.
     """
     names = free_baseline(problem, nominal)
     known = known_parameters(nominal)
-    found, core = residuals(problem, nominal, names), core_rig(nominal, problem.core)
+    block_residuals, core = residuals(problem, nominal, names), core_rig(nominal, problem.core)
     scales = np.array([known[name].tol for name in names])
     size = len(names) + len(moving)
     normal, right, total, count = np.eye(size), np.zeros(size), 0.0, 0  # tolerances are priors
     normal[len(names) :, len(names) :] /= _MOST_OFFSET**2
     for k, prepared in enumerate(problem.recordings):
-        own = [(len(names) + j, one.which) for j, one in enumerate(moving) if one.recording == k]
+        columns = [
+            (len(names) + j, one.which) for j, one in enumerate(moving) if one.recording == k
+        ]
         for block in problem.blocks:
-            base = found[block.name, prepared.recording.name]
+            base = block_residuals[block.name, prepared.recording.name]
             slopes = np.zeros((prepared.n, size))
             if base.jacobian is not None and names:
                 slopes[:, : len(names)] = base.jacobian * scales
-            for column, which in own:
+            for column, which in columns:
                 shares = np.zeros(_changes(prepared).size)
                 shares[which] = 0.5
                 later, sooner = (
-                    change(block, core, _later(prepared, sign * shares), base)
+                    change(block, core, _with_later_commands(prepared, sign * shares), base)
                     for sign in (1.0, -1.0)
                 )
                 slopes[:, column] = sooner - later  # residuals go the other way

@@ -13,7 +13,7 @@ from pamrs.diagnosis.prepare import Residual
 PIECE_TIME = 5.0
 
 
-def spread_over_pieces(problem: Problem, found: Fit) -> dict[str, float]:
+def spread_over_pieces(problem: Problem, fitted: Fit) -> dict[str, float]:
     """Standard deviations of a fit's parameters, by how much the pieces of its recordings disagree.
 
     A fit weights each residual by its noise, as if the model had no error. What a model leaves is
@@ -25,7 +25,7 @@ def spread_over_pieces(problem: Problem, found: Fit) -> dict[str, float]:
     ----------
     problem : Problem
         What was fitted.
-    found : Fit
+    fitted : Fit
         The fit, with the jacobians that it ended with.
 
     Returns
@@ -33,16 +33,16 @@ def spread_over_pieces(problem: Problem, found: Fit) -> dict[str, float]:
     dict of str to float
         By dotted name, SI. The fit's own ones where it has no jacobian of all its parameters.
     """
-    rows, slopes = stacked(problem, found.residuals, found.inflation)
-    names = list(found.scales)
+    rows, slopes = stacked(problem, fitted.residuals, fitted.inflation)
+    names = list(fitted.scales)
     if slopes is None or not names or slopes.shape[1] != len(names):
-        return dict(found.std)
-    scales = np.array([found.scales[name] for name in names])
+        return dict(fitted.std)
+    scales = np.array([fitted.scales[name] for name in names])
     wide = scales * pieces_spread(
-        rows, slopes * scales, found.covariance, pieces_of(problem, found.residuals)
+        rows, slopes * scales, fitted.covariance, pieces_of(problem, fitted.residuals)
     )
-    own = np.array([found.std[name] for name in names])
-    return found.std | dict(zip(names, np.maximum(own, wide).tolist(), strict=True))
+    stated = np.array([fitted.std[name] for name in names])
+    return fitted.std | dict(zip(names, np.maximum(stated, wide).tolist(), strict=True))
 
 
 def pieces_spread(rows: Array, jacobian: Array, covariance: Array, pieces: list[Index]) -> Array:
@@ -82,19 +82,19 @@ def _pull(root: Array, jacobian: Array, rows: Array) -> Array:
     return np.asarray(root @ (axes / leverage @ (axes.T @ (root @ (jacobian.T @ rows)))))
 
 
-def pieces_of(problem: Problem, found: dict[Key, Residual]) -> list[Index]:
+def pieces_of(problem: Problem, residuals: dict[Key, Residual]) -> list[Index]:
     """Rows of the stacked residuals in each piece of a recording, all blocks together."""
     count = 0
     pieces: list[Index] = []
     for prepared in problem.recordings:
         width = bin_width(prepared, FIT_BIN_TIME)
-        own: dict[int, list[Index]] = {}
+        rows_of: dict[int, list[Index]] = {}
         for block in problem.blocks:
-            rows = found[block.name, prepared.recording.name].rows
+            rows = residuals[block.name, prepared.recording.name].rows
             bins = np.arange(rows.size // width)
             at = (bins * width * prepared.dt / PIECE_TIME).astype(int)
             for k in np.unique(at):
-                own.setdefault(int(k), []).append(count + np.flatnonzero(at == k))
+                rows_of.setdefault(int(k), []).append(count + np.flatnonzero(at == k))
             count += bins.size
-        pieces += [np.concatenate(parts) for parts in own.values()]
+        pieces += [np.concatenate(parts) for parts in rows_of.values()]
     return pieces

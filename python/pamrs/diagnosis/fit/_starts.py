@@ -151,7 +151,7 @@ def _starts_of_form(effect: Term, form: Form, *, sealed: bool) -> list[Start]:
     sizes: dict[str, float] = {}
     held: list[list[tuple[str, float]]] = []
     signed = False
-    own = "" if form is effect.info.forms[0] else form.name
+    form_name = "" if form is effect.info.forms[0] else form.name
     for parameter in form.parameters:
         name = f"{effect}.{parameter.name}"
         role = parameter.role_in(sealed=sealed)
@@ -166,7 +166,7 @@ def _starts_of_form(effect: Term, form: Form, *, sealed: bool) -> list[Start]:
             ends = (parameter.lower, parameter.upper) if role in CHOSEN else (parameter.default,)
             held.append([(name, value) for value in ends])
     return [
-        Start(effect, sizes | dict(shape), dict(fixed), tuple(sizes), signed, own)
+        Start(effect, sizes | dict(shape), dict(fixed), tuple(sizes), signed, form_name)
         for shape in itertools.product(*shapes)
         for fixed in itertools.product(*held)
     ]

@@ -32,8 +32,8 @@ from pamrs.diagnosis.fit._fitting import (
     stacked,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
-from pamrs.diagnosis.fit._shaken import Shaken
 from pamrs.diagnosis.fit._spread import pieces_of, pieces_spread
+from pamrs.diagnosis.fit._vibration import VibrationResponse
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.effects import EffectParameter, Term, find_parameter
 from pamrs.errors import SimulationError
@@ -73,19 +73,19 @@ def events_of(effect: Term, form: str = "") -> list[list[EffectParameter]]:
         Its form; the usual one where it is empty.
     """
     shape, leading = effect.info.form(form), effect.info.leading.name
-    own = shape.parameters
+    parameters = shape.parameters
     if shape.own:
-        return [list(own)]
+        return [list(parameters)]
     first = [
         p
-        for p in own
+        for p in parameters
         if not p.repeats and (shape.periodic or p.name == leading or p.role in ("time", "duration"))
     ]
-    every = [[p, *(q for q in own if q.repeats == p.name)] for p in first]
+    every = [[p, *(q for q in parameters if q.repeats == p.name)] for p in first]
     return [list(one) for one in zip(*every, strict=True)]
 
 
-def _tried(parameter: EffectParameter) -> float:
+def _first_value(parameter: EffectParameter) -> float:
     """The value that a search over times gives a parameter."""
     return parameter.default if parameter.tried is None else parameter.tried
 
@@ -104,9 +104,9 @@ def _scale(effect: Term, parameter: str) -> float:
         "rise": _RISE_SCALE,
     }
     first = _first_of(effect, parameter)
-    usual = _FREQUENCY_SCALE if first.unit == "Hz" else _tried(effect.info.leading)
+    usual = _FREQUENCY_SCALE if first.unit == "Hz" else _first_value(effect.info.leading)
     if effect.info.own:
-        return _tried(first)
+        return _first_value(first)
     return scales.get(first.role, usual)
 
 
@@ -137,24 +137,26 @@ def fit_events(
     rig, base = baseline.rig, baseline.residuals
     forms = [form for form in effect.info.forms if form.transient]
     timed = not effect.info.own
-    found = look_for_events(effect, problem, rig, base, inflation) if timed else None
+    usual_events = look_for_events(effect, problem, rig, base, inflation) if timed else None
     shaken = None
     last = None
     # what repeats begins at frequencies; other events begin where those of the usual form are
     for form in sorted(forms, key=lambda form: form.periodic):
         if form.periodic:
-            shaken = shaken or Shaken.of(effect, problem, rig, base, inflation)
-            begun = shaken.best(form.name)
+            shaken = shaken or VibrationResponse.of(effect, problem, rig, base, inflation)
+            events = shaken.best(form.name)
         elif form.own:
-            begun = _drifting(effect, form.name, problem, rig, base, inflation)
+            events = _sizes_by_recording(effect, form.name, problem, rig, base, inflation)
         else:
-            usual = found if last is None else last.events
-            begun = usual if usual is None or form is forms[0] else _in_form(usual, form.name)
-        again = None if begun is None else _jointly(begun, problem, nominal, baseline, inflation)
-        if again is not None and (
-            last is None or 2.0 * (last.cost - again.cost) > _LEAST_EVENT_GAIN
+            usual = usual_events if last is None else last.events
+            events = usual if usual is None or form is forms[0] else _in_form(usual, form.name)
+        joint = (
+            None if events is None else _fit_jointly(events, problem, nominal, baseline, inflation)
+        )
+        if joint is not None and (
+            last is None or 2.0 * (last.cost - joint.cost) > _LEAST_EVENT_GAIN
         ):
-            last = again
+            last = joint
     if last is None:
         return None
     assert last.events is not None
@@ -174,12 +176,17 @@ def _in_form(events: Events, form: str) -> Events:
     """
     effect = events.effect
     values = {}
-    for name, own in events.values.items():
-        told = {p.name: own.get(p.name, _tried(p)) for p in effect.info.form(form).parameters}
-        new = [p for event in events_of(effect, form) for p in event if p.name not in own]
-        early = sum(0.5 * told[p.name] for p in new if p.role == "duration")
+    for name, event_values in events.values.items():
+        parameters = {
+            p.name: event_values.get(p.name, _first_value(p))
+            for p in effect.info.form(form).parameters
+        }
+        added = [
+            p for event in events_of(effect, form) for p in event if p.name not in event_values
+        ]
+        early = sum(0.5 * parameters[p.name] for p in added if p.role == "duration")
         later = [p.name for event in events_of(effect, form) for p in event if p.role == "time"]
-        values[name] = told | {n: max(0.0, told[n] - early) for n in later}
+        values[name] = parameters | {n: max(0.0, parameters[n] - early) for n in later}
     return Events(effect, values, form)
 
 
@@ -220,44 +227,46 @@ def look_for_events(
     size = known.get(effect.info.leading.name)
     periodic = effect.info.form(form).periodic
     shaken = (
-        Shaken.of(effect, problem, rig, base, inflation, known).best(form) if periodic else None
+        VibrationResponse.of(effect, problem, rig, base, inflation, known).best(form)
+        if periodic
+        else None
     )
 
-    def begun_in(alone: Problem, prepared: Prepared) -> Events | None:
+    def start_in(alone: Problem, prepared: Prepared) -> Events | None:
         """Start of the events of one recording, in the form that is asked for."""
         name = prepared.recording.name
         if periodic:
             return None if shaken is None else replace(shaken, values={name: shaken.values[name]})
         if effect.info.own:
-            return _drifting(effect, form, alone, rig, base, inflation, known)
-        own = {key: r for key, r in base.items() if key[1] == name}
-        started = _scan(effect, alone, prepared, rig, own, inflation, size, stopped)
-        begun = Events(effect, {name: started}) if started else None
-        return _in_form(begun, form) if begun and form else begun
+            return _sizes_by_recording(effect, form, alone, rig, base, inflation, known)
+        of_recording = {key: r for key, r in base.items() if key[1] == name}
+        first_values = _scan(effect, alone, prepared, rig, of_recording, inflation, size, stopped)
+        events = Events(effect, {name: first_values}) if first_values else None
+        return _in_form(events, form) if events and form else events
 
-    def one(prepared: Prepared) -> dict[str, float] | None:
+    def events_in(prepared: Prepared) -> dict[str, float] | None:
         alone = replace(problem, recordings=[prepared])
-        begun = begun_in(alone, prepared)
-        if begun is None:
+        events = start_in(alone, prepared)
+        if events is None:
             return None
-        return _fitted(begun, alone, prepared, rig, inflation, known, stopped)
+        return _fit_alone(events, alone, prepared, rig, inflation, known, stopped)
 
     stopped = Event()
     with ThreadPoolExecutor(max_workers=2) as pool:
         try:
-            found = list(pool.map(one, problem.recordings))
+            values_found = list(pool.map(events_in, problem.recordings))
         except BaseException:  # an interrupt is not to wait for two whole searches
             stopped.set()
             raise
     values = {
-        p.recording.name: own
-        for p, own in zip(problem.recordings, found, strict=True)
-        if own is not None
+        p.recording.name: event
+        for p, event in zip(problem.recordings, values_found, strict=True)
+        if event is not None
     }
     return Events(effect, values, form) if values else None
 
 
-def _drifting(
+def _sizes_by_recording(
     effect: Term,
     form: str,
     problem: Problem,
@@ -278,18 +287,18 @@ def _drifting(
     ]
     for prepared in problem.recordings:
         alone, name = replace(problem, recordings=[prepared]), prepared.recording.name
-        own = {key: r for key, r in base.items() if key[1] == name}
-        rows, _ = stacked(alone, own, inflation)
+        of_recording = {key: r for key, r in base.items() if key[1] == name}
+        rows, _ = stacked(alone, of_recording, inflation)
         least = max(_LEAST_EVENT_GAIN, _EVENT_SHARE * float(rows @ rows))
         for shape in itertools.product(*shapes):
-            tried = {leading.name: _tried(leading), **dict(shape)}
-            there = Events(effect, {name: tried}, form).put_into(rig, name)
-            moved, _ = stacked(alone, changes(alone, there, own, effect), inflation)
+            event = {leading.name: _first_value(leading), **dict(shape)}
+            with_event = Events(effect, {name: event}, form).put_into(rig, name)
+            moved, _ = stacked(alone, changes(alone, with_event, of_recording, effect), inflation)
             gain = _gain(rows, moved - rows, scaled=True)
             if gain >= least:
                 least = gain
                 size = -float(rows @ (moved - rows)) / float(np.sum((moved - rows) ** 2))
-                values[name] = tried | {leading.name: size * tried[leading.name]}
+                values[name] = event | {leading.name: size * event[leading.name]}
     return Events(effect, values, form) if values else None
 
 
@@ -305,15 +314,17 @@ def _scan(
 ) -> dict[str, float]:
     """Find where the events of one recording begin, the most telling first; empty without any."""
     slots = len(events_of(effect))
-    typical = _tried(effect.info.leading)
+    typical = _first_value(effect.info.leading)
     length = prepared.n * prepared.dt
     times = np.arange(_FIRST_TIME, length - _LAST_TIME, _SPACING)
     rows, _ = stacked(problem, base, inflation)
     signatures: dict[float, Array] = {}
-    for group in _apart(times, slots):
+    for group in _spaced_groups(times, slots):
         if stopped.is_set():
             return {}
-        values = _numbered([(typical if size is None else size, float(t)) for t in group], effect)
+        values = _event_parameters(
+            [(typical if size is None else size, float(t)) for t in group], effect
+        )
         try:
             moved, _ = stacked(
                 problem,
@@ -335,10 +346,10 @@ def _scan(
             signatures[float(t)] = np.where(begins & ends, change, 0.0)
     chosen: list[float] = []
     span, sizes = np.zeros((rows.size, 0)), np.zeros(0)
-    left = rows
+    rest = rows
     while len(chosen) < slots:
         gains = {
-            t: _gain(left, signature - span @ (span.T @ signature), scaled=size is None)
+            t: _gain(rest, signature - span @ (span.T @ signature), scaled=size is None)
             for t, signature in signatures.items()
             if all(abs(t - s) >= _LEAST_DISTANCE for s in chosen)
         }
@@ -355,24 +366,24 @@ def _scan(
             )
         else:
             sizes = np.ones(len(chosen))
-        left = rows + columns @ sizes
+        rest = rows + columns @ sizes
     events = [
         (float(factor) * (typical if size is None else size), t)
         for factor, t in zip(sizes, chosen, strict=True)
     ]
-    return _numbered(sorted(events, key=lambda c: c[1]), effect) if events else {}
+    return _event_parameters(sorted(events, key=lambda c: c[1]), effect) if events else {}
 
 
-def _gain(left: Array, signature: Array, *, scaled: bool) -> float:
+def _gain(rest: Array, signature: Array, *, scaled: bool) -> float:
     """Gain in the sum of squares by a signature, of the best size or of its own."""
     power = float(signature @ signature)
     if power < 1e-9:
         return 0.0
-    along = float(left @ signature)
+    along = float(rest @ signature)
     return along**2 / power if scaled else -2.0 * along - power
 
 
-def _apart(times: Array, slots: int) -> list[list[float]]:
+def _spaced_groups(times: Array, slots: int) -> list[list[float]]:
     """Times in groups that can be tried in one simulation, far from each other."""
     if slots == 1:
         return [[float(t)] for t in times]
@@ -380,19 +391,19 @@ def _apart(times: Array, slots: int) -> list[list[float]]:
     return [[float(t) for t in times[k::stride]] for k in range(stride)]
 
 
-def _numbered(events: list[tuple[float, float]], effect: Term) -> dict[str, float]:
+def _event_parameters(events: list[tuple[float, float]], effect: Term) -> dict[str, float]:
     """Parameters of a few events of one recording, by their sizes and times."""
     values: dict[str, float] = {}
     for (size, time), parameters in zip(events, events_of(effect), strict=False):
         for parameter in parameters:
             first = _first_of(effect, parameter.name)
-            told = {"time": time, "duration": _tried(first)}
-            values[parameter.name] = told.get(first.role, size)
-    return values | {p.name: _tried(p) for p in effect.info.with_role("rise") if values}
+            by_role = {"time": time, "duration": _first_value(first)}
+            values[parameter.name] = by_role.get(first.role, size)
+    return values | {p.name: _first_value(p) for p in effect.info.with_role("rise") if values}
 
 
-def _fitted(
-    begun: Events,
+def _fit_alone(
+    events_start: Events,
     alone: Problem,
     prepared: Prepared,
     rig: Rig,
@@ -403,21 +414,21 @@ def _fitted(
     """Events of one recording fitted alone, at a model that stays; None where the model leaves its
     range.
     """
-    effect, start = begun.effect, begun.values[prepared.recording.name]
+    effect, start = events_start.effect, events_start.values[prepared.recording.name]
     free = [p for p in start if p not in known and _first_of(effect, p).name not in known]
     scale = np.array([_scale(effect, p) for p in free])
     limits = [_limits(effect, p, prepared) for p in free]
     low, high = (np.array([limit[k] for limit in limits]) / scale for k in (0, 1))
 
-    def told(x: Array) -> dict[str, float]:
+    def values_at(x: Array) -> dict[str, float]:
         return start | {p: float(v) for p, v in zip(free, x * scale, strict=True)}
 
     def evaluate(x: Array) -> tuple[Array, Array, None]:
         if stopped.is_set():
             raise SimulationError("the search for events was stopped")
-        events = replace(begun, values={prepared.recording.name: told(x)})
-        found = residuals(alone, rig, [f"{effect}.{p}" for p in free], events)
-        rows, slope = stacked(alone, found, inflation)
+        events = replace(events_start, values={prepared.recording.name: values_at(x)})
+        by_block = residuals(alone, rig, [f"{effect}.{p}" for p in free], events)
+        rows, slope = stacked(alone, by_block, inflation)
         assert slope is not None
         return rows, slope * scale, None
 
@@ -426,7 +437,7 @@ def _fitted(
         x, _, _ = levenberg_marquardt(evaluate, first, (low, high), _EVALUATIONS_ALONE)
     except SimulationError:
         return None
-    return told(x)
+    return values_at(x)
 
 
 def _limits(effect: Term, parameter: str, prepared: Prepared) -> tuple[float, float]:
@@ -443,7 +454,7 @@ def _limits(effect: Term, parameter: str, prepared: Prepared) -> tuple[float, fl
     return limits.get(_first_of(effect, parameter).role, size)
 
 
-def _jointly(
+def _fit_jointly(
     events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
 ) -> Fit | None:
     """Fit baseline and events of every recording together, a changed mass being the same in all;
@@ -452,45 +463,46 @@ def _jointly(
     One after the other would creep: a baseline that was fitted without the events holds half of
     what a mass does.
     """
-    joint = _Joint.of(events, problem, nominal, baseline, inflation)
-    count = len(joint.names)
+    vector = _EventVector.of(events, problem, nominal, baseline, inflation)
+    count = len(vector.names)
     try:
-        x, (values, jacobian, found), spent = levenberg_marquardt(
-            joint.evaluate, joint.begin(baseline), joint.bounds(), _EVALUATIONS_TOGETHER
+        x, (values, jacobian, by_block), spent = levenberg_marquardt(
+            vector.evaluate, vector.begin(baseline), vector.bounds(), _EVALUATIONS_TOGETHER
         )
     except SimulationError:
         return None
     covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True))
     measured = values.size - count  # priors stand behind
     wide = pieces_spread(
-        values[:measured], jacobian[:measured], covariance, pieces_of(problem, found)
+        values[:measured], jacobian[:measured], covariance, pieces_of(problem, by_block)
     )
     spread = np.maximum(wide, np.sqrt(np.clip(np.diag(covariance), 0.0, None)))
-    told_std = {
-        place: float(s) for place, s in zip(joint.places, spread[count:] * joint.scale, strict=True)
+    std_of = {
+        place: float(s)
+        for place, s in zip(vector.places, spread[count:] * vector.scale, strict=True)
     }
     first = next(iter(events.values))
-    own_std = {
-        p: told_std.get((first, p), told_std.get(("", p), math.nan)) for p in events.values[first]
+    event_std = {
+        p: std_of.get((first, p), std_of.get(("", p), math.nan)) for p in events.values[first]
     }
-    names, scaling = joint.names, joint.scaling
+    names, scaling = vector.names, vector.scaling
     return replace(
         baseline,
         effects=(events.effect,),
         rig=scaling.rig(x[:count], {}),
         values={n: scaling.value(n, float(v)) for n, v in zip(names, x[:count], strict=True)},
         std={n: baseline.std[n] for n in names}
-        | {f"{events.effect}.{p}": s for p, s in own_std.items()},
+        | {f"{events.effect}.{p}": s for p, s in event_std.items()},
         cost=0.5 * float(values @ values),
-        residuals=found,
+        residuals=by_block,
         moved={n: float(v) for n, v in zip(names, x[:count], strict=True)},
         evaluations=spent,
-        events=joint.told(x),
+        events=vector.events_at(x),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Joint:
+class _EventVector:
     """Baseline and events of every recording as one vector.
 
     Attributes
@@ -509,7 +521,7 @@ class _Joint:
         The other elements; one that all recordings share has no recording.
     scale : (k,) array
         Scale of each of these [SI].
-    kept : list of array
+    slopes : list of array
         Sensitivities to the baseline parameters in each recording, which stay as they were without
         the events.
     """
@@ -521,35 +533,35 @@ class _Joint:
     scaling: Scaling
     places: list[tuple[str, str]]
     scale: Array
-    kept: list[Array]
+    slopes: list[Array]
 
     @staticmethod
     def of(
         events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
-    ) -> _Joint:
+    ) -> _EventVector:
         """The vector of a problem."""
         effect, settings = events.effect, problem.settings
         shared = effect.info.form(events.form).shared
         names = list(baseline.moved)
         places = [("", p) for p in shared] + [
-            (name, p) for name, own in events.values.items() for p in own if p not in shared
+            (name, p) for name, event in events.values.items() for p in event if p not in shared
         ]
         scale = np.array([_scale(effect, p) for _, p in places])
-        kept = []
+        slopes = []
         for prepared in problem.recordings:
             rows, slope = stacked(
                 replace(problem, recordings=[prepared]), baseline.residuals, inflation
             )
-            kept.append(np.zeros((rows.size, 0)) if slope is None else slope[:, : len(names)])
+            slopes.append(np.zeros((rows.size, 0)) if slope is None else slope[:, : len(names)])
         scaling = Scaling(nominal, names, {}, settings)
-        return _Joint(events, problem, inflation, names, scaling, places, scale, kept)
+        return _EventVector(events, problem, inflation, names, scaling, places, scale, slopes)
 
-    def told(self, x: Array) -> Events:
+    def events_at(self, x: Array) -> Events:
         """Events that the elements of a vector stand for."""
-        values = {name: dict(own) for name, own in self.events.values.items()}
+        values = {name: dict(event) for name, event in self.events.values.items()}
         for (name, p), value in zip(self.places, x[len(self.names) :] * self.scale, strict=True):
-            for own in values.values() if name == "" else [values[name]]:
-                own[p] = float(value)
+            for event in values.values() if name == "" else [values[name]]:
+                event[p] = float(value)
         return replace(self.events, values=values)
 
     def evaluate(self, x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
@@ -557,27 +569,29 @@ class _Joint:
         recording.
         """
         effect, count = self.events.effect, len(self.names)
-        wanted = sorted({p for own in self.events.values.values() for p in own})
+        wanted = sorted({p for event in self.events.values.values() for p in event})
         names = [f"{effect}.{p}" for p in wanted]
-        found = residuals(self.problem, self.scaling.rig(x[:count], {}), names, self.told(x))
+        by_block = residuals(
+            self.problem, self.scaling.rig(x[:count], {}), names, self.events_at(x)
+        )
         slopes = np.array(
             [self.scaling.slope(n, float(v)) for n, v in zip(self.names, x[:count], strict=True)]
         )
         parts, columns = [], []
-        for prepared, fixed in zip(self.problem.recordings, self.kept, strict=True):
+        for prepared, fixed in zip(self.problem.recordings, self.slopes, strict=True):
             rows, slope = stacked(
-                replace(self.problem, recordings=[prepared]), found, self.inflation
+                replace(self.problem, recordings=[prepared]), by_block, self.inflation
             )
             assert slope is not None
-            own = self.events.values.get(prepared.recording.name, {})
+            event = self.events.values.get(prepared.recording.name, {})
             block = np.zeros((rows.size, len(self.places)))
             for k, (name, p) in enumerate(self.places):
-                if p in own and name in ("", prepared.recording.name):
+                if p in event and name in ("", prepared.recording.name):
                     block[:, k] = slope[:, wanted.index(p)] * self.scale[k]
             parts.append(rows)
             columns.append(np.concatenate([fixed * slopes, block], axis=1))
         prior = np.eye(count, count + len(self.places))
-        return np.concatenate([*parts, x[:count]]), np.concatenate([*columns, prior]), found
+        return np.concatenate([*parts, x[:count]]), np.concatenate([*columns, prior]), by_block
 
     def begin(self, baseline: Fit) -> Array:
         """Vector where the fit begins: the baseline as it was, each event where it was found."""
@@ -586,18 +600,22 @@ class _Joint:
             for n in self.names
         ]
         every = self.events.values
-        begun = [
-            float(np.median([own[p] for own in every.values()])) if name == "" else every[name][p]
+        event_start = [
+            float(np.median([event[p] for event in every.values()]))
+            if name == ""
+            else every[name][p]
             for name, p in self.places
         ]
-        return np.concatenate([start, np.array(begun) / self.scale])
+        return np.concatenate([start, np.array(event_start) / self.scale])
 
     def bounds(self) -> tuple[Array, Array]:
         """Smallest and largest value of each element."""
         by_name = {p.recording.name: p for p in self.problem.recordings}
-        own = [by_name[name] if name else self.problem.recordings[0] for name, _ in self.places]
+        recordings = [
+            by_name[name] if name else self.problem.recordings[0] for name, _ in self.places
+        ]
         effect = self.events.effect
-        limits = [_limits(effect, p, r) for (_, p), r in zip(self.places, own, strict=True)]
+        limits = [_limits(effect, p, r) for (_, p), r in zip(self.places, recordings, strict=True)]
         low = np.concatenate(
             [self.scaling.bounds[0], np.array([limit[0] for limit in limits]) / self.scale]
         )

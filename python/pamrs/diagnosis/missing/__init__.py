@@ -7,7 +7,7 @@ recording), `worst_block` (which one misses most).
 
 from __future__ import annotations
 
+from pamrs.diagnosis.missing._missing_input import missing_input_of, worst_block
 from pamrs.diagnosis.missing._reconstruct import Reconstruction, reconstruct
-from pamrs.diagnosis.missing._whole import missing_input_of, worst_block
 
 __all__ = ["Reconstruction", "missing_input_of", "reconstruct", "worst_block"]

@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class _Along:
+class _JoinedInput:
     """Missing input and its arguments, all recordings one after the other.
 
     Attributes
@@ -61,19 +61,25 @@ class _Along:
     recording: NDArray[np.intp]
 
     @classmethod
-    def of(cls, recordings: Sequence[MissingRecording], names: Sequence[str]) -> _Along:
+    def of(cls, recordings: Sequence[MissingRecording], names: Sequence[str]) -> _JoinedInput:
         """Rows of some recordings."""
-        arguments = {n: np.concatenate([own.along(n) for own in recordings]) for n in names}
+        arguments = {
+            n: np.concatenate([recording.along(n) for recording in recordings]) for n in names
+        }
         value, std = (
-            np.concatenate([getattr(own, n) for own in recordings]) for n in ("value", "std")
+            np.concatenate([getattr(recording, n) for recording in recordings])
+            for n in ("value", "std")
         )
         widest = max(float(std.max()), 1e-300)
         weight = np.maximum(1.0 - (std / widest) ** 2, 0.0) + 1e-6
         folds = [
-            (_STRETCHES * np.arange(own.time.size) // max(1, own.time.size) + k) % _FOLDS
-            for k, own in enumerate(recordings)
+            (_STRETCHES * np.arange(recording.time.size) // max(1, recording.time.size) + k)
+            % _FOLDS
+            for k, recording in enumerate(recordings)
         ]
-        which = np.repeat(np.arange(len(recordings)), [own.time.size for own in recordings])
+        which = np.repeat(
+            np.arange(len(recordings)), [recording.time.size for recording in recordings]
+        )
         return cls(value, weight, arguments, np.concatenate(folds), which)
 
     def fitted(self, columns: Array, rows: NDArray[np.bool_]) -> Array:
@@ -81,17 +87,17 @@ class _Along:
         weighted = columns[rows] * self.weight[rows, None]
         ridge = _SMOOTHING_RIDGE * float(np.sum(self.weight[rows])) / columns.shape[1]
         normal = weighted.T @ columns[rows] + ridge * np.eye(columns.shape[1])
-        found: Array = columns @ np.linalg.solve(normal, weighted.T @ self.value[rows])
-        return found
+        values: Array = columns @ np.linalg.solve(normal, weighted.T @ self.value[rows])
+        return values
 
-    def told(self, columns: Array) -> float:
+    def share_predicted(self, columns: Array) -> float:
         """Share of the input's square that a function predicts in stretches not fitted to."""
         guess = np.empty_like(self.value)
         for k in range(_FOLDS):
             inside = self.fold == k
             guess[inside] = self.fitted(columns, ~inside)[inside]
-        left = float(self.weight @ (self.value - guess) ** 2)
-        return 1.0 - left / max(float(self.weight @ self.value**2), 1e-300)
+        missed = float(self.weight @ (self.value - guess) ** 2)
+        return 1.0 - missed / max(float(self.weight @ self.value**2), 1e-300)
 
     def mean(self, values: Array, rows: NDArray[np.bool_]) -> float:
         """Weighted mean of some rows."""
@@ -115,17 +121,21 @@ def _direction(rate: Array) -> Array:
     return np.tanh(rate / (_TURN * fastest))
 
 
-def _candidates(along: _Along, position: str, rate: str) -> dict[str, Array]:
+def _candidates(along: _JoinedInput, position: str, rate: str) -> dict[str, Array]:
     """Columns of a function of each argument, the simplest first."""
-    way = _direction(along.arguments[rate])
-    found = {"": np.ones((along.value.size, 1))}
-    found[rate] = way[:, None] * _hats(np.abs(along.arguments[rate]))
-    found |= {n: _hats(x) for n, x in along.arguments.items() if n not in (rate, "time")}
-    either = [_hats(along.arguments[position]) * (s * way[:, None] > 0.0) for s in (1.0, -1.0)]
-    found["strokes"] = np.hstack(either)
+    direction = _direction(along.arguments[rate])
+    columns = {"": np.ones((along.value.size, 1))}
+    columns[rate] = direction[:, None] * _hats(np.abs(along.arguments[rate]))
+    columns |= {n: _hats(x) for n, x in along.arguments.items() if n not in (rate, "time")}
+    either = [
+        _hats(along.arguments[position]) * (s * direction[:, None] > 0.0) for s in (1.0, -1.0)
+    ]
+    columns["strokes"] = np.hstack(either)
     each = [along.recording == k for k in range(along.recording[-1] + 1)]
-    time = [_hats(np.where(own, along.arguments["time"], 0.0)) * own[:, None] for own in each]
-    return found | {"time": np.hstack(time)}
+    time = [
+        _hats(np.where(inside, along.arguments["time"], 0.0)) * inside[:, None] for inside in each
+    ]
+    return columns | {"time": np.hstack(time)}
 
 
 def times_of(recordings: Sequence[MissingRecording]) -> list[MissingTime]:
@@ -133,21 +143,26 @@ def times_of(recordings: Sequence[MissingRecording]) -> list[MissingTime]:
     edges under which its squares in and outside of them are the most probable ones of two normal
     distributions.
     """
-    squares = [own.value**2 for own in recordings]
+    squares = [recording.value**2 for recording in recordings]
     free = [np.ones(square.size, dtype=bool) for square in squares]
-    found = list[MissingTime]()
-    while len(found) < _MOST_TIMES:
+    times = list[MissingTime]()
+    while len(times) < _MOST_TIMES:
         each = [_clearest(k, squares, free) for k in range(len(recordings))]
         k = max(range(len(each)), key=lambda k: each[k][0])
         gain, (start, stop), ratio = each[k]
         if gain <= 0.0:
             break
-        own = recordings[k]
-        found.append(
-            MissingTime(own.recording, float(own.time[start]), float(own.time[stop - 1]), ratio)
+        recording = recordings[k]
+        times.append(
+            MissingTime(
+                recording.recording,
+                float(recording.time[start]),
+                float(recording.time[stop - 1]),
+                ratio,
+            )
         )
         free[k][start:stop] = False
-    return found
+    return times
 
 
 def _clearest(
@@ -158,9 +173,9 @@ def _clearest(
     last; ratio of the roots of their means.
     """
     power, count = (
-        np.concatenate([[0.0], np.cumsum(own)]) for own in (squares[k] * free[k], free[k])
+        np.concatenate([[0.0], np.cumsum(part)]) for part in (squares[k] * free[k], free[k])
     )
-    parts = [square[own] for square, own in zip(squares, free, strict=True)]
+    parts = [square[part] for square, part in zip(squares, free, strict=True)]
     all_power = math.fsum(float(np.sum(part)) for part in parts)
     all_count = float(sum(part.size for part in parts))
     whole = math.fsum(float(np.sum(square)) for square in squares)
@@ -179,12 +194,12 @@ def _clearest(
     return float(gain[best] * clear[best]), rows, math.sqrt(float(high[best] / low[best]))
 
 
-def with_words(found: MissingInput) -> MissingInput:
+def with_words(missing: MissingInput) -> MissingInput:
     """Describe what a missing input depends on, and when it acts if that is at some times alone.
 
     Parameters
     ----------
-    found : MissingInput
+    missing : MissingInput
         With its recordings, at least one.
 
     Returns
@@ -192,67 +207,74 @@ def with_words(found: MissingInput) -> MissingInput:
     MissingInput
         With ``argument``, ``explained``, ``sentence`` and ``times``.
     """
-    argument, share, sentence = _explained(found)
-    times = [] if 1.0 - share < _LEFT_BESIDE_TIMES else times_of(found.recordings)
+    argument, share, sentence = _explained(missing)
+    times = [] if 1.0 - share < _LEFT_BESIDE_TIMES else times_of(missing.recordings)
     inside = [
-        _during(own, t) for own in found.recordings for t in times if t.recording == own.recording
+        _during(recording, t)
+        for recording in missing.recordings
+        for t in times
+        if t.recording == recording.recording
     ]
-    whole, there = (
-        math.fsum(float(np.sum(own.value**2)) for own in part)
-        for part in (found.recordings, inside)
+    whole, during = (
+        math.fsum(float(np.sum(recording.value**2)) for recording in part)
+        for part in (missing.recordings, inside)
     )
-    if not times or 1.0 - share < _MORE_THAN_OTHER_TIMES * (1.0 - there / whole):
-        return replace(found, argument=argument, explained=share, sentence=sentence)
-    _, _, sentence = _explained(replace(found, recordings=inside))
+    if not times or 1.0 - share < _MORE_THAN_OTHER_TIMES * (1.0 - during / whole):
+        return replace(missing, argument=argument, explained=share, sentence=sentence)
+    _, _, sentence = _explained(replace(missing, recordings=inside))
     spans = [f"from {t.start:.1f} to {t.stop:.1f} s of {t.recording}" for t in times]
     ratio = format_number(times[0].ratio, 2)
     sentence += f", {listed(spans)}: {ratio} times as much as at other times"
-    return replace(found, argument="time", explained=there / whole, sentence=sentence, times=times)
+    return replace(
+        missing, argument="time", explained=during / whole, sentence=sentence, times=times
+    )
 
 
-def _during(own: MissingRecording, time: MissingTime) -> MissingRecording:
+def _during(recording: MissingRecording, time: MissingTime) -> MissingRecording:
     """The part of a recording between the ends of a time."""
-    rows = (own.time >= time.start) & (own.time <= time.stop)
-    return own.each(lambda values: values[rows])
+    rows = (recording.time >= time.start) & (recording.time <= time.stop)
+    return recording.each(lambda values: values[rows])
 
 
-def _explained(found: MissingInput) -> tuple[str, float, str]:
+def _explained(missing: MissingInput) -> tuple[str, float, str]:
     """Argument that explains most of an input (``time`` for a steady one, empty where no single one
     does), the share of its square that a function of it explains, cross-validated, and a sentence.
     """
-    along = _Along.of(found.recordings, [*found.units])
-    candidates = _candidates(along, found.position, found.rate)
-    told = {name: along.told(columns) for name, columns in candidates.items()}
-    best = max(told.values())
-    name = next(n for n, share in told.items() if share > best - _CLEARER)
+    along = _JoinedInput.of(missing.recordings, [*missing.units])
+    candidates = _candidates(along, missing.position, missing.rate)
+    shares = {name: along.share_predicted(columns) for name, columns in candidates.items()}
+    best = max(shares.values())
+    name = next(n for n, share in shares.items() if share > best - _CLEARER)
     if best < _LEAST_TOLD:
-        size = _shown(along.mean(np.abs(along.value), along.weight > 0.0), found.unit)
-        named = _taken(found, along)
+        size = _shown(along.mean(np.abs(along.value), along.weight > 0.0), missing.unit)
+        named = _share_of_names(missing, along)
         return "", max(0.0, best), f"{size}{named or ', and no single argument explains it'}"
     columns = candidates[name]
-    others = [n for n in found.units if n not in (name, "time", found.rate)]
-    others = [n for n in others if not (name == "strokes" and n == found.position)]
+    others = [n for n in missing.units if n not in (name, "time", missing.rate)]
+    others = [n for n in others if not (name == "strokes" and n == missing.position)]
     deeper = {
-        n: along.told(np.hstack([columns, columns * _scaled(along.arguments[n])[:, None]]))
+        n: along.share_predicted(
+            np.hstack([columns, columns * _scaled(along.arguments[n])[:, None]])
+        )
         for n in others
     }
     beside = max(deeper, key=lambda n: deeper[n], default="")
-    if beside and deeper[beside] < told[name] + _CLEARER:
+    if beside and deeper[beside] < shares[name] + _CLEARER:
         beside = ""
-    sentence = _sentence(found, along, name, along.fitted(columns, along.weight > 0.0))
+    sentence = _sentence(missing, along, name, along.fitted(columns, along.weight > 0.0))
     if beside:
-        sentence += _beside(found, along, name, beside)
-    argument = {"": "time", "strokes": found.position}.get(name, name)
-    return argument, min(1.0, max(told[name], 0.0)), sentence + _taken(found, along)
+        sentence += _on_second_argument(missing, along, name, beside)
+    argument = {"": "time", "strokes": missing.position}.get(name, name)
+    return argument, min(1.0, max(shares[name], 0.0)), sentence + _share_of_names(missing, along)
 
 
-def _taken(found: MissingInput, along: _Along) -> str:
+def _share_of_names(missing: MissingInput, along: _JoinedInput) -> str:
     """Words on the share of an input's square that named effects take; empty where it is small."""
-    laws = [own.law for own in found.recordings if own.law is not None]
-    if len(laws) < len(found.recordings):
+    laws = [recording.law for recording in missing.recordings if recording.law is not None]
+    if len(laws) < len(missing.recordings):
         return ""
-    left, whole = (along.value - np.concatenate(laws)) ** 2, along.value**2
-    share = 1.0 - float(along.weight @ left) / max(float(along.weight @ whole), 1e-300)
+    rest, whole = (along.value - np.concatenate(laws)) ** 2, along.value**2
+    share = 1.0 - float(along.weight @ rest) / max(float(along.weight @ whole), 1e-300)
     return f", of which {100.0 * share:.0f} % is what is named" if share > _LEAST_TOLD else ""
 
 
@@ -264,65 +286,65 @@ def _scaled(x: Array) -> Array:
 
 def _shown(value: float, unit: str) -> str:
     """A size of the input, or a value of an argument, in the unit that people read."""
-    own, factor = shown_unit(unit)
-    return f"{format_number(factor * value, 2)} {own}"
+    name, factor = shown_unit(unit)
+    return f"{format_number(factor * value, 2)} {name}"
 
 
-def _sense(found: MissingInput, mean: float) -> str:
+def _sense(missing: MissingInput, mean: float) -> str:
     """Direction of an input of one sign, in words."""
-    noun = spoken_name(found.block)
-    if found.unit == "kg/s":
+    noun = spoken_name(missing.block)
+    if missing.unit == "kg/s":
         return f" into the {noun}" if mean > 0.0 else f" out of the {noun}"
     more = "larger" if mean > 0.0 else "smaller"
-    return f" towards a {more} {spoken_name(found.position)}"
+    return f" towards a {more} {spoken_name(missing.position)}"
 
 
-def _sentence(found: MissingInput, along: _Along, name: str, fit: Array) -> str:
+def _sentence(missing: MissingInput, along: _JoinedInput, name: str, fit: Array) -> str:
     """Sentence on the input as a function of one argument."""
-    rate = along.arguments[found.rate]
+    rate = along.arguments[missing.rate]
     every = along.weight > 0.0
-    if name == found.rate:
+    if name == missing.rate:
         moving = np.abs(rate) > np.median(np.abs(rate))
         against = along.mean(fit * np.sign(rate), moving) < 0.0
-        told = _shown(along.mean(np.abs(fit), moving), found.unit)
+        size_in_words = _shown(along.mean(np.abs(fit), moving), missing.unit)
         _, middle, fast = (
             along.mean(np.abs(fit), rows) if rows.any() else 0.0
             for rows in along.thirds(np.abs(rate), every)
         )
         growing = ", growing with the rate" if fast > _FASTER * middle else ""
-        if channel_of(found.block) in ("arm", "load"):
-            return f"{told} {'against' if against else 'with'} the motion{growing}"
+        if channel_of(missing.block) in ("arm", "load"):
+            return f"{size_in_words} {'against' if against else 'with'} the motion{growing}"
         ways = ("falls", "grows")[:: 1 if against else -1]
-        noun = spoken_name(found.position)
-        return f"{told} more while the {noun} {ways[0]}, less while it {ways[1]}{growing}"
+        noun = spoken_name(missing.position)
+        return f"{size_in_words} more while the {noun} {ways[0]}, less while it {ways[1]}{growing}"
     mean, size = along.mean(fit, every), along.mean(np.abs(fit), every)
     sided = abs(mean) > _ONE_SIGN_SHARE * size
-    told = _shown(size, found.unit) + (_sense(found, mean) if sided else "")
+    size_in_words = _shown(size, missing.unit) + (_sense(missing, mean) if sided else "")
     if not name:
-        return f"{told}, steadily"
+        return f"{size_in_words}, steadily"
     if name == "strokes":
-        noun = spoken_name(found.position)
-        return f"{told}, depending on the {noun} and on the direction of its stroke"
+        noun = spoken_name(missing.position)
+        return f"{size_in_words}, depending on the {noun} and on the direction of its stroke"
     noun, x = ("time" if name == "time" else spoken_name(name)), along.arguments[name]
     trend = float(np.corrcoef(np.abs(fit) if sided else fit, x)[0, 1])
     if name == "time" or abs(trend) < _TREND:
-        return f"{told}, depending on the {noun}"
-    return f"{told}, {'growing' if trend > 0.0 else 'falling'} with the {noun}"
+        return f"{size_in_words}, depending on the {noun}"
+    return f"{size_in_words}, {'growing' if trend > 0.0 else 'falling'} with the {noun}"
 
 
-def _beside(found: MissingInput, along: _Along, name: str, beside: str) -> str:
+def _on_second_argument(missing: MissingInput, along: _JoinedInput, name: str, beside: str) -> str:
     """Dependence of the input's size on a second argument, in words."""
-    rate = np.abs(along.arguments[found.rate])
-    rows = rate > np.median(rate) if name == found.rate else along.weight > 0.0
+    rate = np.abs(along.arguments[missing.rate])
+    rows = rate > np.median(rate) if name == missing.rate else along.weight > 0.0
     low, _, high = along.thirds(along.arguments[beside], rows)
-    sizes = [along.mean(np.abs(along.value), own) for own in (low, high)]
-    places = [along.mean(along.arguments[beside], own) for own in (low, high)]
+    sizes = [along.mean(np.abs(along.value), part) for part in (low, high)]
+    places = [along.mean(along.arguments[beside], part) for part in (low, high)]
     if max(sizes) < _OTHER_SIZE * min(sizes):
         return f", other at another {spoken_name(beside)}"
     larger = int(sizes[1] > sizes[0])
     ratio = sizes[larger] / max(sizes[1 - larger], 1e-300)
     times = "twice" if 1.75 < ratio < 2.25 else f"{format_number(ratio, 2)} times"
-    there, here = (
-        _shown(place, found.units[beside]) for place in (places[larger], places[1 - larger])
+    at_larger, at_smaller = (
+        _shown(place, missing.units[beside]) for place in (places[larger], places[1 - larger])
     )
-    return f", {times} as large at a {spoken_name(beside)} of {there} as of {here}"
+    return f", {times} as large at a {spoken_name(beside)} of {at_larger} as of {at_smaller}"

@@ -107,13 +107,13 @@ class _Windows:
         places = [a + self.spacing * np.arange(k) for a, k in zip(self.starts, counts, strict=True)]
         self.time: Array = prepared.dt * np.concatenate(places).astype(np.float64)
         self.heights = at(self.time)
-        self.means, counted, self.response = self._begun()
+        self.means, counted, self.response = self._first_run()
         first = bins_of(prepared) * np.arange(self.means.size)
         window = np.searchsorted(self.starts, first, side="right") - 1
         within = [window == k for k in range(len(lengths))]
-        self.bins = [np.flatnonzero(own & (counted > 0)) for own in within]
+        self.bins = [np.flatnonzero(inside & (counted > 0)) for inside in within]
 
-    def _begun(self) -> tuple[Array, Array, Array]:
+    def _first_run(self) -> tuple[Array, Array, Array]:
         """The first run, with less of the input where the model leaves its range with all of it."""
         for _ in range(_HALVINGS):
             try:
@@ -127,42 +127,48 @@ class _Windows:
         """Residual by bin [noise levels], usable samples and response, of some heights."""
         block, prepared = self.block, self.prepared
         if has_port(block):
-            found = residual(block, self.core, prepared, [], Input(self.spacing, heights))
-            value, response = found.value, found.response
+            block_residual = residual(block, self.core, prepared, [], Input(self.spacing, heights))
+            value, response = block_residual.value, block_residual.response
             assert response is not None  # an input was given
         else:
-            found, hats, own, response = self._reading
-            value = found.value - found.freed(np.sum(hats * heights[own], axis=1))
+            block_residual, hats, which, response = self._reading
+            value = block_residual.value - block_residual.freed(
+                np.sum(hats * heights[which], axis=1)
+            )
         width = bins_of(prepared)
-        means, counts = binned(value, found.rows, width)
-        return means / self.noise, counts, binned(response, found.rows, width)[0] / self.noise
+        means, counts = binned(value, block_residual.rows, width)
+        return (
+            means / self.noise,
+            counts,
+            binned(response, block_residual.rows, width)[0] / self.noise,
+        )
 
     @cached_property
     def _reading(self) -> tuple[Residual, Array, NDArray[np.intp], Array]:
         """The residual of a block whose reading errs, whatever the heights; hats of the knots of
         each sample's window (n, k), which knots these are, and what they do to the residual (n, k).
         """
-        found = residual(self.block, self.core, self.prepared, [])
-        hats, which = self._hats(found)
-        return found, hats, which, np.apply_along_axis(found.freed, 0, hats)
+        block_residual = residual(self.block, self.core, self.prepared, [])
+        hats, which = self._hats(block_residual)
+        return block_residual, hats, which, np.apply_along_axis(block_residual.freed, 0, hats)
 
-    def _hats(self, found: Residual) -> tuple[Array, NDArray[np.intp]]:
+    def _hats(self, block_residual: Residual) -> tuple[Array, NDArray[np.intp]]:
         """Error of a reading at each sample for each knot of its window (n, k), and which knots
         these are.
         """
-        most = max(own.stop - own.start for own in self.knots)
+        most = max(knots.stop - knots.start for knots in self.knots)
         hats, which = (
-            np.zeros((found.value.size, most)),
-            np.zeros((found.value.size, most), np.intp),
+            np.zeros((block_residual.value.size, most)),
+            np.zeros((block_residual.value.size, most), np.intp),
         )
-        for a, b, own in zip(self.starts, self.ends, self.knots, strict=True):
-            count = own.stop - own.start
+        for a, b, knots in zip(self.starts, self.ends, self.knots, strict=True):
+            count = knots.stop - knots.start
             place = np.arange(b - a)[:, None] / self.spacing
             hats[a:b, :count] = np.maximum(0.0, 1.0 - np.abs(place - np.arange(count)))
-            which[a:b, :count] = own.start + np.arange(count)
+            which[a:b, :count] = knots.start + np.arange(count)
         return hats, which
 
-    def left(self, means: Array) -> Array:
+    def mean_squares(self, means: Array) -> Array:
         """Mean square of the residual in each window."""
         return np.array([float(np.mean(means[i] ** 2)) if i.size else 0.0 for i in self.bins])
 
@@ -173,52 +179,52 @@ class _Windows:
         # an input that reaches nothing has any size
         scale = math.sqrt(float(np.sum(self.response**2, axis=1).max(initial=0.0))) or 1.0
         sizes, parts, evidence = _INPUT_SIZES / scale, [], np.zeros(_INPUT_SIZES.size)
-        for rows, own in zip(self.bins, self.knots, strict=True):
-            response = self.response[rows][:, : own.stop - own.start]
-            apart = np.arange(own.stop - own.start)
-            told = response @ np.exp(-np.abs(apart[:, None] - apart) / _CORRELATION)
-            values, axes = np.linalg.eigh(told @ response.T)
-            seen = axes.T @ (self.means[rows] + response @ self.heights[own])
+        for rows, knots in zip(self.bins, self.knots, strict=True):
+            response = self.response[rows][:, : knots.stop - knots.start]
+            apart = np.arange(knots.stop - knots.start)
+            covariance = response @ np.exp(-np.abs(apart[:, None] - apart) / _CORRELATION)
+            values, axes = np.linalg.eigh(covariance @ response.T)
+            projected = axes.T @ (self.means[rows] + response @ self.heights[knots])
             values = np.maximum(values, 0.0)
             variance = 1.0 + np.outer(sizes**2, values)
-            evidence -= 0.5 * np.sum(seen**2 / variance + np.log(variance), axis=1)
-            parts.append((values, seen, axes.T @ told))
+            evidence -= 0.5 * np.sum(projected**2 / variance + np.log(variance), axis=1)
+            parts.append((values, projected, axes.T @ covariance))
         size = float(sizes[np.argmax(evidence)])
         heights, std = np.zeros_like(self.heights), np.zeros_like(self.heights)
-        for (values, seen, told), own in zip(parts, self.knots, strict=True):
+        for (values, projected, covariance), knots in zip(parts, self.knots, strict=True):
             weight = size**2 / (1.0 + size**2 * values)
-            heights[own] = told.T @ (weight * seen)
-            variance = size**2 * (1.0 - told.T**2 @ weight)
-            std[own] = np.sqrt(np.maximum(variance, 0.0))
+            heights[knots] = covariance.T @ (weight * projected)
+            variance = size**2 * (1.0 - covariance.T**2 @ weight)
+            std[knots] = np.sqrt(np.maximum(variance, 0.0))
         return heights, std
 
     def improve(self, steps: int) -> None:
         """Make Gauss-Newton steps in each window as long as they pay."""
         length = np.ones(len(self.starts))
         for step in range(steps):
-            before = self.left(self.means)
+            before = self.mean_squares(self.means)
             todo = ((before > _ENOUGH) | (step < _ALWAYS)) & (length > _LEAST_NEWTON_STEP)
             if not todo.any():
                 return
             wanted, _ = self.most_probable()
-            tried = self.heights.copy()
+            heights = self.heights.copy()
             for k in np.flatnonzero(todo).tolist():
-                own = self.knots[k]
-                tried[own] += length[k] * (wanted[own] - tried[own])
+                knots = self.knots[k]
+                heights[knots] += length[k] * (wanted[knots] - heights[knots])
             try:
-                means, _, response = self.run(tried)
+                means, _, response = self.run(heights)
             except SimulationError:
                 length *= _SHORTER
                 continue
-            better = todo & (self.left(means) < before)
+            better = todo & (self.mean_squares(means) < before)
             length = np.where(todo & ~better, _SHORTER * length, np.minimum(1.0, 2.0 * length))
             for k in np.flatnonzero(better).tolist():
-                self.take(k, tried, means, response)
+                self.take(k, heights, means, response)
 
     def take(self, k: int, heights: Array, means: Array, response: Array) -> None:
         """Copy heights, residual and response of one window from another run."""
-        own, rows = self.knots[k], self.bins[k]
-        self.heights[own] = heights[own]
+        knots, rows = self.knots[k], self.bins[k]
+        self.heights[knots] = heights[knots]
         self.means[rows], self.response[rows] = means[rows], response[rows]
 
 
@@ -230,7 +236,7 @@ def _nothing(time: Array) -> Array:
 def _interpolated(time: Array, heights: Array) -> Callable[[Array], Array]:
     """An input as a function of time, of its heights at knots."""
     order = np.argsort(time, kind="stable")
-    return lambda there: np.interp(there, time[order], heights[order])
+    return lambda at: np.interp(at, time[order], heights[order])
 
 
 def reconstruct(
@@ -272,25 +278,25 @@ def reconstruct(
     windows = _Windows(block, core, prepared, noise, _nothing)
     first = [windows.means[i] for i in windows.bins]
     windows.improve(_FIRST_STEPS)
-    if (windows.left(windows.means) > _FAR**2).any() and has_port(block):
+    if (windows.mean_squares(windows.means) > _FAR**2).any() and has_port(block):
         _from_short(windows)
-    followed = windows.left(windows.means) <= _FAR**2
+    followed = windows.mean_squares(windows.means) <= _FAR**2
     _, std = windows.most_probable()
     inside = [
-        np.arange(own.start, own.stop)[windows.time[own] < prepared.dt * end]
-        for own, end, good, rows in zip(
+        np.arange(knots.start, knots.stop)[windows.time[knots] < prepared.dt * end]
+        for knots, end, good, rows in zip(
             windows.knots, windows.ends, followed, windows.bins, strict=True
         )
         if good and rows.size
     ]
     if not inside:
         return None
-    kept = np.concatenate(inside)
+    known = np.concatenate(inside)
     without, rest = np.concatenate(first), np.concatenate([windows.means[i] for i in windows.bins])
     return Reconstruction(
-        windows.time[kept],
-        windows.heights[kept],
-        std[kept],
+        windows.time[known],
+        windows.heights[known],
+        std[known],
         float(np.mean(without**2)),
         float(np.mean(rest**2)),
         rest.size,
@@ -304,10 +310,10 @@ def _from_short(windows: _Windows) -> None:
     at: Callable[[Array], Array] = _nothing
     grown = windows
     for share, steps in _HORIZONS:
-        own = replace(block, window=block.window if share == 1.0 else share * whole)
-        grown = _Windows(own, windows.core, prepared, windows.noise, at)
+        shorter = replace(block, window=block.window if share == 1.0 else share * whole)
+        grown = _Windows(shorter, windows.core, prepared, windows.noise, at)
         grown.improve(steps)
         at = _interpolated(grown.time, grown.heights)
-    better = grown.left(grown.means) < windows.left(windows.means)
+    better = grown.mean_squares(grown.means) < windows.mean_squares(windows.means)
     for k in np.flatnonzero(better).tolist():
         windows.take(k, grown.heights, grown.means, grown.response)

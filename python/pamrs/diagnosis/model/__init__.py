@@ -3,7 +3,7 @@ recordings at every stage, the budget of each block, and the whole rig from its 
 
 Public: `conclude`, `Conclusion`, `Models`, `with_std`, `spoiled_channels`, `owners_of_effects`,
 `owners_of_parameters` (whose value the model has), `DETERMINED_SHARE` (from when recordings tell
-one), `said_of_constants` (free runs).
+one), `notes_on_constants` (free runs).
 """
 
 from pamrs.diagnosis.model._budget import (
@@ -12,7 +12,7 @@ from pamrs.diagnosis.model._budget import (
     owners_of_parameters,
 )
 from pamrs.diagnosis.model._conclude import Conclusion, Models, conclude, spoiled_channels, with_std
-from pamrs.diagnosis.model._free_run import said_of_constants
+from pamrs.diagnosis.model._free_run import notes_on_constants
 
 __all__ = [
     "DETERMINED_SHARE",
@@ -21,7 +21,7 @@ __all__ = [
     "conclude",
     "owners_of_effects",
     "owners_of_parameters",
-    "said_of_constants",
+    "notes_on_constants",
     "spoiled_channels",
     "with_std",
 ]

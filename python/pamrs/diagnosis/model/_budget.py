@@ -11,7 +11,7 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.channels import unit_of
-from pamrs.diagnosis.evidence import Candidate, Judged, significant
+from pamrs.diagnosis.evidence import FittedHypothesis, Judged, significant
 from pamrs.diagnosis.fit import (
     Events,
     Key,
@@ -70,7 +70,7 @@ class _Step:
 def budget(
     judged: list[Judged],
     problem: Problem,
-    found: Stages,
+    by_stage: Stages,
     noise_level: dict[Key, NoiseLevel],
     nominal: Rig,
     final: Rig,
@@ -89,7 +89,7 @@ def budget(
         The groups with their verdicts.
     problem : Problem
         Held-out recordings (those that were fitted, where there are no others).
-    found : dict of str to dict
+    by_stage : dict of str to dict
         Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
     noise_level : dict
         Noise by block and recording.
@@ -108,23 +108,25 @@ def budget(
     terms: list[BudgetTerm] = []
     best = owners_of_effects([one.chosen for one in judged])
     owners = {name: judged[k] for name, k in best.items() if name in judged[k].named}
-    bare = _without_held(problem, nominal, found["before"])
+    bare = _without_held(problem, nominal, by_stage["before"])
     for one in judged:
-        steps = _steps(one, problem, found, nominal, final, events)
+        steps = _steps(one, problem, by_stage, nominal, final, events)
         for block in one.group.blocks:
 
-            def kept(residual: Residuals, block: Block = block) -> Excess:
+            def excess_of(residual: Residuals, block: Block = block) -> Excess:
                 return excess(block, problem.recordings, residual, noise_level, problem.settings)
 
             acting = [(e, r) for e, r in bare if e is None or acts_in(e, block)]
-            before = kept(acting[0][1])
+            before = excess_of(acting[0][1])
             if not significant(before):
                 continue
-            stages = [_Stage("held", (e,), kept(now)) for e, now in acting[1:] if e is not None]
+            stages = [
+                _Stage("held", (e,), excess_of(now)) for e, now in acting[1:] if e is not None
+            ]
             for step in steps:
                 acts = not step.terms or any(concerns(term, block) for term in step.terms)
-                change = kept(step.change) if step.change and acts else None
-                stages.append(_Stage(step.kind, step.terms, kept(step.now), acts, change))
+                change = excess_of(step.change) if step.change and acts else None
+                stages.append(_Stage(step.kind, step.terms, excess_of(step.now), acts, change))
             shares = _Shares(before, stages, problem.settings)
             terms += _terms(block, shares, stages, one, owners, final)
     return terms
@@ -144,7 +146,7 @@ class _Stage:
 def _steps(
     judged: Judged,
     problem: Problem,
-    found: Stages,
+    by_stage: Stages,
     nominal: Rig,
     final: Rig,
     events: Events | None,
@@ -152,30 +154,30 @@ def _steps(
     """The steps of a group after what the nominal model holds."""
     names = _in_order(judged)
     if not names:
-        refit = _Step("parameters", (), found["refit"])
+        refit = _Step("parameters", (), by_stage["refit"])
         if judged.verdict != "unlisted" or judged.group.closure is None:
             return [refit]
-        return [refit, _Step("form", (), found["after"])]
-    own = replace(problem, blocks=judged.group.blocks)
+        return [refit, _Step("form", (), by_stage["after"])]
+    part = replace(problem, blocks=judged.group.blocks)
     known = known_parameters(nominal)
 
     @cache
-    def kept(present: tuple[tuple[Term, ...], ...]) -> Residuals | None:
+    def with_terms(present: tuple[tuple[Term, ...], ...]) -> Residuals | None:
         if present == names:
-            return found["after"]
+            return by_stage["after"]
         happened = events if events is not None and (events.effect,) in present else None
         lacking = [term for terms in names if terms not in present for term in terms]
         rig = _without_terms(lacking, known, final)
         try:
-            return residuals(own, rig, (), happened)
+            return residuals(part, rig, (), happened)
         except SimulationError:  # without the others the model leaves its range
             return None
 
-    steps = [_Step("parameters", (), kept(()) or found["refit"])]
+    steps = [_Step("parameters", (), with_terms(()) or by_stage["refit"])]
     for n, terms in enumerate(names):
-        now = kept(names[: n + 1]) or steps[-1].now
-        without = kept((*names[:n], *names[n + 1 :])) if len(names) > 1 else None
-        change = _difference(found["after"], without) if without else None
+        now = with_terms(names[: n + 1]) or steps[-1].now
+        without = with_terms((*names[:n], *names[n + 1 :])) if len(names) > 1 else None
+        change = _difference(by_stage["after"], without) if without else None
         kind = "effect" if terms[0].is_effect else "wrong_parameter"
         steps.append(_Step(kind, terms, now, change))
     return steps
@@ -280,20 +282,20 @@ def _terms(
 
 def _values(terms: Sequence[Term], judged: Judged) -> dict[str, EffectParameterFound]:
     """Fitted values of a step's effect or wrong parameters, SI."""
-    found = judged.chosen.fit
+    fitted = judged.chosen.fit
     out = {}
-    for name, value in found.values.items():
+    for name, value in fitted.values.items():
         effect = effect_of(name)
         if effect is not None and effect in terms:
             key = name.removeprefix(f"{effect}.")
-            form = effect.info.form(form_in(found.rig, effect))
+            form = effect.info.form(form_in(fitted.rig, effect))
             unit = next((p.unit for p in form.parameters if p.name == key), "")
         elif Term(name) in terms:
             key = name
-            unit = (find_parameter(name) if effect else found.rig.parameter(name)).unit
+            unit = (find_parameter(name) if effect else fitted.rig.parameter(name)).unit
         else:
             continue
-        std = found.std.get(name, math.inf)
+        std = fitted.std.get(name, math.inf)
         out[key] = EffectParameterFound(value, std if math.isfinite(std) else None, unit)
     return out
 
@@ -339,10 +341,10 @@ class _Shares:
         ]
         total = np.sum([none, *changes], axis=0)
         # a single name, and names of which one cannot be taken away, have equal parts
-        told = all(one.change is not None for one in names if one.acts) & (total > 1e-12)
+        known = all(one.change is not None for one in names if one.acts) & (total > 1e-12)
         alike = 1.0 / max(1, sum(one.acts for one in names))
         return [
-            np.where(told, change / np.maximum(total, 1e-12), alike * one.acts)
+            np.where(known, change / np.maximum(total, 1e-12), alike * one.acts)
             for change, one in zip(changes, names, strict=True)
         ]
 
@@ -365,7 +367,7 @@ class _Shares:
         return float(shares[0]), [float(low), float(high)]
 
 
-def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
+def owners_of_parameters(candidates: list[FittedHypothesis]) -> dict[str, int]:
     """Number of the group that determines each parameter best, where several have it (sensors'
     zeros): the one with the least standard deviation; of those that tell hardly more than the file,
     the last one along the chain, whose output it is.
@@ -375,32 +377,32 @@ def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
     """
 
     def spread(k: int, name: str) -> float:
-        own = candidates[k].fit
-        std = own.std.get(name, math.inf) if own.events is None else 0.0
-        return min(std, DETERMINED_SHARE * own.scales[name]) if name in own.scales else std
+        fitted = candidates[k].fit
+        std = fitted.std.get(name, math.inf) if fitted.events is None else 0.0
+        return min(std, DETERMINED_SHARE * fitted.scales[name]) if name in fitted.scales else std
 
-    found: dict[str, int] = {}
+    owners: dict[str, int] = {}
     for k, candidate in enumerate(candidates):
         for name in candidate.fit.moved:
-            if spread(k, name) <= spread(found.get(name, k), name):
-                found[name] = k
-    return found
+            if spread(k, name) <= spread(owners.get(name, k), name):
+                owners[name] = k
+    return owners
 
 
-def owners_of_effects(candidates: list[Candidate]) -> dict[Term, int]:
+def owners_of_effects(candidates: list[FittedHypothesis]) -> dict[Term, int]:
     """Number of the group that determines each effect best, where several have it (a clock moves
     what arm and chamber see): the one with the least mean logarithm of standard deviations.
     """
-    found: dict[Term, int] = {}
+    owners: dict[Term, int] = {}
     for k, candidate in enumerate(candidates):
         for effect in candidate.effects:
-            last = candidates[found.get(effect, k)]
+            last = candidates[owners.get(effect, k)]
             if _doubt(candidate, effect) <= _doubt(last, effect):
-                found[effect] = k
-    return found
+                owners[effect] = k
+    return owners
 
 
-def _doubt(candidate: Candidate, effect: Term) -> float:
+def _doubt(candidate: FittedHypothesis, effect: Term) -> float:
     """Mean logarithm of the standard deviations of an effect's parameters, in typical sizes."""
     std = candidate.fit.std
     logs = []

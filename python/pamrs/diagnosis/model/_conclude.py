@@ -15,7 +15,7 @@ from scipy.linalg import block_diag
 from pamrs._arrays import Array
 from pamrs.diagnosis.evidence import (
     BlockGroup,
-    Candidate,
+    FittedHypothesis,
     Judged,
     autocorrelation_of,
     case_ambiguity,
@@ -75,7 +75,7 @@ class Models:
     ----------
     judged : list of Judged
         The groups, what they name fitted beside what other groups know better.
-    starts, chosen : list of Candidate
+    starts, chosen : list of FittedHypothesis
         The baseline of each group, and what goes into the final model, with standard deviations
         that hold for equations that are not quite the rig's.
     owners : dict of str to int
@@ -87,8 +87,8 @@ class Models:
     """
 
     judged: list[Judged]
-    starts: list[Candidate]
-    chosen: list[Candidate]
+    starts: list[FittedHypothesis]
+    chosen: list[FittedHypothesis]
     owners: dict[str, int]
     nominal: Rig
     baseline: Rig
@@ -219,11 +219,13 @@ def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGro
 
 def _own_errors(problem: Problem, noise_level: dict[Key, NoiseLevel]) -> dict[str, float]:
     """Standard deviation of each channel by the error that is taken for the model's own [SI]."""
-    found = {}
+    sizes = {}
     for block in problem.blocks:
         levels = [noise_level[block.name, p.recording.name] for p in problem.recordings]
-        found[block.channel] = math.sqrt(sum(own.error_variance for own in levels) / len(levels))
-    return found
+        sizes[block.channel] = math.sqrt(
+            sum(level.error_variance for level in levels) / len(levels)
+        )
+    return sizes
 
 
 def _sound_models(
@@ -248,16 +250,18 @@ def _sound_models(
         models = _models(nominal, fitted, judged, case_verdict(j.verdict for j in judged))
         inside = models.residuals(fitted)
         outside = inside if held is fitted else models.residuals(held)
-        problem, found = (fitted, inside) if held is fitted else (held, outside)
-        table = _table(problem, found, noise_level)
+        problem, by_stage = (fitted, inside) if held is fitted else (held, outside)
+        table = _table(problem, by_stage, noise_level)
         blamed = _blamed(models.judged, spoiled_channels(table)) | _needless(models, settings)
         blamed |= _worse_than_file(models.judged, table, settings.noise_margin - 1.0)
         missing = {k: _missed(j, table, errors) for k, j in enumerate(models.judged)}
         if not blamed and not any(missing.values()):
             return models, inside, outside
         groups = [
-            _without_name(own, models.judged[k]) if k in blamed else _with_mismatch(own, missing[k])
-            for k, own in enumerate(groups)
+            _without_name(group, models.judged[k])
+            if k in blamed
+            else _with_mismatch(group, missing[k])
+            for k, group in enumerate(groups)
         ]
 
 
@@ -284,14 +288,14 @@ def _worse_than_file(
     """Groups, by number, whose names predict the blocks in which they act worse than the model of
     the rig file, by more than `margin` of the noise's variance.
     """
-    found = set()
+    worse = set()
     for k, one in enumerate(judged):
         acting = [b for b in one.group.blocks if any(concerns(t, b) for t in one.added)]
         errors = [table[b.channel] for b in acting]
         lost = [(e.after**2 - e.before**2) / e.noise**2 - margin for e in errors]
         if lost and sum(lost) > 0.0:
-            found.add(k)
-    return found
+            worse.add(k)
+    return worse
 
 
 def _missed(
@@ -308,8 +312,8 @@ def _missed(
         size = min(error.refit, error.after)
         return beyond(size, error.noise, own_errors[block.channel])
 
-    found = [block for block in judged.group.blocks if more(block) > MOST_MISSED]
-    return sorted(found, key=more, reverse=True)
+    missed = [block for block in judged.group.blocks if more(block) > MOST_MISSED]
+    return sorted(missed, key=more, reverse=True)
 
 
 def _with_mismatch(group: BlockGroup, missed: list[Block]) -> BlockGroup:
@@ -329,10 +333,10 @@ def _blamed(judged: list[Judged], spoilt: Collection[str]) -> set[int]:
     added = {k: _additions(j) for k, j in enumerate(judged) if _additions(j)}
     blamed: set[int] = set()
     for channel in spoilt:
-        own = {k for k in added if channel in {b.channel for b in judged[k].group.blocks}}
+        having = {k for k in added if channel in {b.channel for b in judged[k].group.blocks}}
         blocks = [b for j in judged for b in j.group.blocks if b.channel == channel]
         acting = {k for k in added if any(concerns(term, b) for b in blocks for term in added[k])}
-        blamed |= own or acting
+        blamed |= having or acting
     return blamed
 
 
@@ -344,23 +348,30 @@ def _additions(judged: Judged) -> tuple[Term, ...]:
 
 def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -> Models:
     """The rig at every stage, from the verdicts of the groups."""
-    begun = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
-    baseline = _merged(nominal, begun)
-    starts = _widened(fitted, judged, begun)
+    refitted = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
+    baseline = _merged(nominal, refitted)
+    starts = _widened(fitted, judged, refitted)
     if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
         final = nominal if verdict == "none" else baseline
         return Models(
-            judged, starts, starts, owners_of_parameters(begun), nominal, baseline, final, verdict
+            judged,
+            starts,
+            starts,
+            owners_of_parameters(refitted),
+            nominal,
+            baseline,
+            final,
+            verdict,
         )
-    wanted = [_model_of(j, start) for j, start in zip(judged, begun, strict=True)]
-    ended = _settled(nominal, fitted, judged, wanted)
-    chosen = _widened(fitted, judged, ended)
+    wanted = [_model_of(j, start) for j, start in zip(judged, refitted, strict=True)]
+    settled = _settled(nominal, fitted, judged, wanted)
+    chosen = _widened(fitted, judged, settled)
     judged = [
         replace(j, chosen=c) if j.named or j.wrong else j
         for j, c in zip(judged, chosen, strict=True)
     ]
-    final = _merged(nominal, ended)
-    owners = owners_of_parameters(ended)
+    final = _merged(nominal, settled)
+    owners = owners_of_parameters(settled)
     return Models(judged, starts, chosen, owners, nominal, baseline, final, verdict)
 
 
@@ -369,23 +380,25 @@ def _known(models: Models) -> KnownValues:
     of_file = {n: p for n, p in known_parameters(models.nominal).items() if p.tol > 0}
     names, values, parts = list[str](), list[float](), list[Array]()
     for k, candidate in enumerate(models.chosen):
-        found = candidate.fit
-        every = list(found.scales)
-        own = [n for n in every if models.owners.get(n, k) == k and math.isfinite(found.std[n])]
-        at = [every.index(n) for n in own]
-        fitted = np.sqrt(np.maximum(np.diag(found.covariance)[at], 1e-300))
-        wide = np.array([found.std[n] for n in own]) / fitted
-        size, axes = np.linalg.eigh(found.covariance[np.ix_(at, at)] * np.outer(wide, wide))
+        fitted_model = candidate.fit
+        every = list(fitted_model.scales)
+        names_here = [
+            n for n in every if models.owners.get(n, k) == k and math.isfinite(fitted_model.std[n])
+        ]
+        at = [every.index(n) for n in names_here]
+        fitted = np.sqrt(np.maximum(np.diag(fitted_model.covariance)[at], 1e-300))
+        wide = np.array([fitted_model.std[n] for n in names_here]) / fitted
+        size, axes = np.linalg.eigh(fitted_model.covariance[np.ix_(at, at)] * np.outer(wide, wide))
         parts.append(axes * np.sqrt(np.maximum(size, 0.0)))
-        names += own
-        values += [found.values[n] for n in own]
+        names += names_here
+        values += [fitted_model.values[n] for n in names_here]
     rest = [n for n in of_file if n not in names and math.isfinite(of_file[n].tol)]
     parts.append(np.diag([of_file[n].tol for n in rest]))
     values += [of_file[n].value for n in rest]
     return KnownValues((*names, *rest), np.array(values), block_diag(*parts))
 
 
-def _model_of(judged: Judged, start: Candidate) -> Candidate:
+def _model_of(judged: Judged, start: FittedHypothesis) -> FittedHypothesis:
     """Candidate of a group for the model: what is named, else a nameless form, else parameters."""
     if judged.named or judged.wrong:
         return judged.chosen
@@ -405,17 +418,17 @@ def _models_of(
     """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a
     name; those of an effect with times of its own can predict no other recording.
     """
-    found, least = [], problem.settings.simulated_from
+    likely, least = [], problem.settings.simulated_from
     healthy = {h.rest: p for h, p in probabilities.items() if h in (NONE, PARAMETERS)}
 
-    def model(chosen: list[Candidate]) -> Rig:
+    def model(chosen: list[FittedHypothesis]) -> Rig:
         stated = _widened(problem, judged, chosen)
         return with_std(_merged(nominal, chosen), nominal, stated, owners_of_parameters(chosen))
 
     likeliest = max(healthy, key=lambda rest: healthy[rest], default="")
     if sum(healthy.values()) >= least:
         chosen = [j.group.candidates[0] for j in judged]
-        found.append((likeliest, model(chosen), sum(healthy.values())))
+        likely.append((likeliest, model(chosen), sum(healthy.values())))
     for hypothesis, p in probabilities.items():
         wanted = hypothesis.set
         if p < least or hypothesis.rest or not all(t.id in CATALOGUE or t.is_value for t in wanted):
@@ -424,11 +437,11 @@ def _models_of(
         if any(c.fit.events is not None for c in chosen):
             continue
         if {term for c in chosen for term in c.terms} == wanted:
-            found.append((str(hypothesis), model(chosen), p))
-    return found
+            likely.append((str(hypothesis), model(chosen), p))
+    return likely
 
 
-def _inside(group: BlockGroup, wanted: frozenset[Term]) -> Candidate:
+def _inside(group: BlockGroup, wanted: frozenset[Term]) -> FittedHypothesis:
     """The most probable hypothesis of a group that names nothing else than what is wanted; the
     baseline where there is none.
     """
@@ -439,38 +452,38 @@ def _inside(group: BlockGroup, wanted: frozenset[Term]) -> Candidate:
 
 
 def _settled(
-    nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]
-) -> list[Candidate]:
+    nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[FittedHypothesis]
+) -> list[FittedHypothesis]:
     """Refit groups with sensors' zeros held that another group determines better and differently.
 
     A rig has one zero of a sensor; the other values of a fit are right beside its own only.
     """
     owners = owners_of_parameters(chosen)
-    found = list(chosen)
+    settled_candidates = list(chosen)
     for k, candidate in enumerate(chosen):
-        own = replace(problem, blocks=judged[k].group.blocks)
+        part = replace(problem, blocks=judged[k].group.blocks)
         # those that were held before too: a fit that frees one again is right beside its own only
         common = {
             n: chosen[owner].fit
             for n, owner in owners.items()
-            if owner != k and n.startswith("sensors.") and any(depends(b, n) for b in own.blocks)
+            if owner != k and n.startswith("sensors.") and any(depends(b, n) for b in part.blocks)
         }
         own_values = candidate.fit.rig.parameters
-        apart = any(
+        differ = any(
             abs(own_values[n].value - other.values[n])
             > _ZERO_DIFFERENCE * nominal.parameters[n].tol
             for n, other in common.items()
         )
-        if apart and candidate.fit.events is None:
+        if differ and candidate.fit.events is None:
             effects = candidate.fit.effects
             free, fixed, forms = parts_of(
                 start_of(candidate.fit, effect, LEAST_START) for effect in effects
             )
             settled = {n: other.values[n] for n, other in common.items()}
-            autocorrelation = autocorrelation_of(own, candidate.fit, judged[k].group.noise_level)
+            autocorrelation = autocorrelation_of(part, candidate.fit, judged[k].group.noise_level)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
                 again = fit(
-                    own,
+                    part,
                     nominal,
                     effects,
                     free,
@@ -482,16 +495,18 @@ def _settled(
                     freed=candidate.fit.freed,
                     forms=forms,
                 )
-                found[k] = replace(candidate, fit=again)
-    return found
+                settled_candidates[k] = replace(candidate, fit=again)
+    return settled_candidates
 
 
-def _widened(problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
+def _widened(
+    problem: Problem, judged: list[Judged], chosen: list[FittedHypothesis]
+) -> list[FittedHypothesis]:
     """The fits of the groups with the standard deviations that are stated."""
     return [with_stated_std(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
 
 
-def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
+def _merged(nominal: Rig, candidates: list[FittedHypothesis]) -> Rig:
     """One rig from the groups' fits; where two have a value of their own, that of the group that
     knows it best.
     """
@@ -502,7 +517,9 @@ def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
     return with_known(rig, {name: candidates[k].fit.values[name] for name, k in owners})
 
 
-def _added(nominal: Rig, candidates: list[Candidate]) -> Iterator[tuple[Candidate, dict[str, Any]]]:
+def _added(
+    nominal: Rig, candidates: list[FittedHypothesis]
+) -> Iterator[tuple[FittedHypothesis, dict[str, Any]]]:
     """Effects that the fits have and the nominal model has not, each from the fit that knows it
     best.
     """
@@ -513,7 +530,9 @@ def _added(nominal: Rig, candidates: list[Candidate]) -> Iterator[tuple[Candidat
                 yield candidate, entry
 
 
-def with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[str, int]) -> Rig:
+def with_std(
+    rig: Rig, nominal: Rig, candidates: list[FittedHypothesis], owners: dict[str, int]
+) -> Rig:
     """A model with the standard deviations of its effects; of one that the nominal model held, as
     the group has it that knows it best.
     """
@@ -526,7 +545,7 @@ def with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[s
 
 
 def _table(
-    problem: Problem, found: dict[str, dict[Key, Residual]], noise_level: dict[Key, NoiseLevel]
+    problem: Problem, by_stage: dict[str, dict[Key, Residual]], noise_level: dict[Key, NoiseLevel]
 ) -> dict[str, ChannelError]:
     """Error of every channel at every stage."""
     out = {}
@@ -536,13 +555,13 @@ def _table(
         for prepared in problem.recordings:
             noise.append(noise_level[block.name, prepared.recording.name].sample ** 2)
             weights.append(
-                max(1, int(found["refit"][block.name, prepared.recording.name].rows.sum()))
+                max(1, int(by_stage["refit"][block.name, prepared.recording.name].rows.sum()))
             )
         level = math.sqrt(float(np.average(noise, weights=weights)))
         for stage in ("before", "refit", "after"):
             squares = []
             for prepared in problem.recordings:
-                r = found[stage][block.name, prepared.recording.name]
+                r = by_stage[stage][block.name, prepared.recording.name]
                 squares.append(float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0)
             errors[stage] = math.sqrt(float(np.average(squares, weights=weights)))
         out[block.channel] = ChannelError(level, errors["before"], errors["refit"], errors["after"])

@@ -63,13 +63,13 @@ class KnownValues:
 _FREED = ("muscle_force", "joint_torque", "temperature")
 """Channels whose constant is fitted to each recording."""
 
-_COMMANDS = ("valve_command", "supply_command", "pressure_command")
+_RUN_COMMANDS = ("valve_command", "supply_command", "pressure_command")
 """Channels that drive a free run."""
 
 
 def free_run(
     problem: Problem,
-    found: Stages,
+    by_stage: Stages,
     nominal: Rig,
     final: Rig,
     events: Events | None,
@@ -87,7 +87,7 @@ def free_run(
     ----------
     problem : Problem
         Held-out recordings (those that were fitted, where there are no others).
-    found : dict of str to dict
+    by_stage : dict of str to dict
         Residuals of the cut chain by stage (``before``, ``after``), block and recording.
     nominal, final : Rig
         The model of the rig file, and the one with what was found.
@@ -106,12 +106,14 @@ def free_run(
         the recording that the nominal model misses most, in noise levels, channel by channel.
     """
     runs, missing, curves, most = [], [], list[Trace](), -1.0
-    for prepared in (_with_starts(p, problem, found["after"]) for p in problem.recordings):
+    for prepared in (_with_starts(p, problem, by_stage["after"]) for p in problem.recordings):
         recording = prepared.recording
         try:
-            there = final if events is None else events.put_into(final, recording.name)
-            run, drawn = _of(prepared, problem, found, nominal, there, noise_level or {})
-            runs.append(_judged(run, prepared, problem.blocks, there, known))
+            model = final if events is None else events.put_into(final, recording.name)
+            run, drawn = _run_of_recording(
+                prepared, problem, by_stage, nominal, model, noise_level or {}
+            )
+            runs.append(_with_off_channels(run, prepared, problem.blocks, model, known))
             missed = max((e.times_before for e in run.channels.values()), default=0.0)
             if missed > most:
                 most, curves = missed, drawn
@@ -122,16 +124,21 @@ def free_run(
     return runs, "without a free run: " + "; ".join(missing) if missing else "", curves
 
 
-def _with_starts(prepared: Prepared, problem: Problem, found: dict[Key, Residual]) -> Prepared:
+def _with_starts(
+    prepared: Prepared, problem: Problem, block_residuals: dict[Key, Residual]
+) -> Prepared:
     """A recording with the temperatures at which its gases began, as their blocks have them."""
-    own = {b.channel: found[b.name, prepared.recording.name].temperature for b in problem.blocks}
-    return replace(prepared, temperatures={n: kelvin for n, kelvin in own.items() if kelvin})
+    starts = {
+        b.channel: block_residuals[b.name, prepared.recording.name].temperature
+        for b in problem.blocks
+    }
+    return replace(prepared, temperatures={n: kelvin for n, kelvin in starts.items() if kelvin})
 
 
-def _of(
+def _run_of_recording(
     prepared: Prepared,
     problem: Problem,
-    found: Stages,
+    by_stage: Stages,
     nominal: Rig,
     final: Rig,
     noise_level: Mapping[Key, NoiseLevel],
@@ -152,7 +159,7 @@ def _of(
         block = covering.get(recorded_as(channel))
         if block is None:
             return None
-        residual = found[stage][block, recording.name]
+        residual = by_stage[stage][block, recording.name]
         values = residual.value[residual.rows]
         return math.sqrt(float(np.mean(values**2))) if values.size else None
 
@@ -178,7 +185,7 @@ def _of(
     return entry, curves
 
 
-def _judged(
+def _with_off_channels(
     run: FreeRun,
     prepared: Prepared,
     blocks: Sequence[Block],
@@ -207,9 +214,9 @@ def _judged(
         part = f"whether it is off was asked of its first {logged.duration:.4g} s"
         note = f"{note}; {part}" if note else part
     # drives bring noise into a block, and so into what its channel's error is compared with
-    levels = {recorded_as(n): own for n in doubtful if (own := run.channels[n].noise)}
-    left = _left(prepared, logged, final, known, prepared.noise | levels)
-    off = {n for n in doubtful if left.get(n, math.inf) > _OFF_NOISES}
+    levels = {recorded_as(n): level for n in doubtful if (level := run.channels[n].noise)}
+    least = _least_misses(prepared, logged, final, known, prepared.noise | levels)
+    off = {n for n in doubtful if least.get(n, math.inf) > _OFF_NOISES}
     far = {recorded_as(name) for name in off}
     drives = {b.channel: far.intersection(b.drives) for b in blocks if b.mechanical}
     for name in list(off):
@@ -221,7 +228,7 @@ def _judged(
     return replace(run, channels=channels, note=note)
 
 
-def _left(
+def _least_misses(
     prepared: Prepared,
     logged: Recording,
     final: Rig,
@@ -233,18 +240,18 @@ def _left(
 
     Steps of Gauss and Newton inside that distance, each tried by a simulation.
     """
-    begun, count = _begun(final, prepared), len(known.names)
+    starts, count = _gas_starts(final, prepared), len(known.names)
     compared = _compared(prepared, logged)
 
     def run(moved: Array) -> dict[str, Array]:
         values = dict(zip(known.names, known.values + known.root @ moved[:count], strict=True))
-        late = _late(logged, _OFF_LATE * float(moved[count]))
-        warm = zip(begun.items(), moved[count + 1 :].tolist(), strict=True)
-        begins = {name: there.kelvin + there.unsure * away for (name, there), away in warm}
-        there = with_known(final, values)
-        return _misses(there, late, begins, compared, noise, _OFF_ROWS)
+        late = _with_late_commands(logged, _OFF_LATE * float(moved[count]))
+        warm = zip(starts.items(), moved[count + 1 :].tolist(), strict=True)
+        begins = {name: start.kelvin + start.unsure * away for (name, start), away in warm}
+        start = with_known(final, values)
+        return _misses(start, late, begins, compared, noise, _OFF_ROWS)
 
-    at, least = np.zeros(count + 1 + len(begun)), dict[str, float]()
+    at, least = np.zeros(count + 1 + len(starts)), dict[str, float]()
     with contextlib.suppress(PamrsError, ArithmeticError):  # a model that leaves its range
         for _ in range(_OFF_STEPS + 1):
             now = run(at)
@@ -252,11 +259,11 @@ def _left(
             least = {name: min(size, least.get(name, size)) for name, size in sizes.items()}
             if max(least.values()) <= _OFF_NOISES:
                 break
-            at = _moved(run, at, now)
+            at = _least_missing_step(run, at, now)
     return least
 
 
-def _moved(
+def _least_missing_step(
     run: Callable[[Array], dict[str, Array]],
     at: Array,
     now: dict[str, Array],
@@ -268,13 +275,13 @@ def _moved(
         step = np.zeros(at.size)
         step[k] = -0.5 if at[k] > 0.0 else 0.5
         with contextlib.suppress(PamrsError, ArithmeticError):  # it has no slope there
-            there = run(at + step)
-            slopes[:, k] = (np.concatenate([there[n] for n in now]) - here) / step[k]
-    left, size, right = np.linalg.svd(slopes, full_matrices=False)
-    wanted = left.T @ (slopes @ at - here)  # along each axis, as an offset from what is known
+            beside = run(at + step)
+            slopes[:, k] = (np.concatenate([beside[n] for n in now]) - here) / step[k]
+    axes, size, directions = np.linalg.svd(slopes, full_matrices=False)
+    wanted = axes.T @ (slopes @ at - here)  # along each axis, as an offset from what is known
     # as far as a draw is in as many directions as are seen
-    seen = int(np.sum(size > _OFF_NOISES * math.sqrt(here.size / len(now))))
-    most = float(chi2.isf(_OFF_CHANCE, max(1, seen)))
+    shown = int(np.sum(size > _OFF_NOISES * math.sqrt(here.size / len(now))))
+    most = float(chi2.isf(_OFF_CHANCE, max(1, shown)))
 
     def far(ridge: float) -> Array:
         return np.asarray(size * wanted / (size**2 + ridge))
@@ -283,33 +290,33 @@ def _moved(
     low, high = math.log(tiny), math.log(tiny * 1e24)
     if float(np.sum(far(tiny) ** 2)) > most:
         low = brentq(lambda r: float(np.sum(far(math.exp(r)) ** 2)) - most, low, high)
-    return np.asarray(right.T @ far(math.exp(low)))
+    return np.asarray(directions.T @ far(math.exp(low)))
 
 
-class _Begins(NamedTuple):
+class _StartTemperature(NamedTuple):
     """Temperature at which a gas begins, and its standard deviation [K]."""
 
     kelvin: float
     unsure: float
 
 
-def _begun(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
+def _gas_starts(rig: Rig, prepared: Prepared) -> dict[str, _StartTemperature]:
     """Temperature at which each gas with a balance of energy begins, by chamber: that of the room,
     but where its thermometer or its pressure clearly says otherwise.
     """
-    own = prepared.settings
-    room, found = float(rig.tables("gas")[""]["temperature"]), {}
+    settings = prepared.settings
+    room, starts = float(rig.tables("gas")[""]["temperature"]), {}
     for name, table in rig.tables("chamber").items():
         if table["gas"] != "energy_balance":
             continue
         read = prepared.signals.get(dotted("temperature", name))
-        told = prepared.temperatures.get(dotted("muscle_pressure", name), room)
-        begins = told if read is None else float(read[0][0])
-        away = abs(begins - room) > own.begun_temperature_error
+        fitted = prepared.temperatures.get(dotted("muscle_pressure", name), room)
+        begins = fitted if read is None else float(read[0][0])
+        away = abs(begins - room) > settings.begun_temperature_error
         # a pressure that stands still does not tell
-        unsure = own.begun_temperature_error if away or read is not None else _OFF_WARM
-        found[name] = _Begins(begins if away else room, unsure)
-    return found
+        unsure = settings.begun_temperature_error if away or read is not None else _OFF_WARM
+        starts[name] = _StartTemperature(begins if away else room, unsure)
+    return starts
 
 
 def _measured(rig: Rig, recording: Recording) -> list[str]:
@@ -338,7 +345,7 @@ def _misses(
     return out
 
 
-def _late(recording: Recording, samples: float) -> Recording:
+def _with_late_commands(recording: Recording, samples: float) -> Recording:
     """A recording whose commands come some samples later (or earlier)."""
     if samples == 0.0:
         return recording
@@ -346,12 +353,12 @@ def _late(recording: Recording, samples: float) -> Recording:
     moved = {
         name: np.interp(at - samples, at, values)
         for name, values in recording.channels.items()
-        if channel_of(name) in _COMMANDS
+        if channel_of(name) in _RUN_COMMANDS
     }
     return replace(recording, channels=recording.channels | moved)
 
 
-def said_of_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[str]:
+def notes_on_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[str]:
     """Channels that the whole rig misses by far more than their blocks do, in words: what is
     constant in a recording is fitted to each, and no block is judged by it.
 
@@ -416,14 +423,14 @@ def _curves(
     logged: Recording, channel: str, before: Simulation | None, after: Simulation | None
 ) -> Trace:
     """A channel as it was measured and as both models give it."""
-    own, nothing = recorded_as(channel), np.full(len(logged), np.nan)
+    recorded, nothing = recorded_as(channel), np.full(len(logged), np.nan)
     return Trace(
         logged.name,
         logged.role,
         channel,
         unit_of(channel),
         logged.time,
-        np.where(logged.mask[own], logged.channels[own], np.nan),
+        np.where(logged.mask[recorded], logged.channels[recorded], np.nan),
         nothing if before is None else before[channel],
         after=None if after is None else after[channel],
     )
@@ -434,7 +441,7 @@ def _errors(
 ) -> tuple[dict[str, float], str, Simulation | None]:
     """Root mean square error of each measured channel, and why there is none; the simulation."""
     try:
-        begins = {name: begin.kelvin for name, begin in _begun(rig, prepared).items()}
+        begins = {name: begin.kelvin for name, begin in _gas_starts(rig, prepared).items()}
         run = replay(rig, logged, temperatures=begins, record=_measured(rig, logged))
         return differences(run, _compared(prepared, logged)), "", run
     except RecordingError:

@@ -23,8 +23,8 @@ from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, acts_in, bin_width, two_at_a_time
 from pamrs.diagnosis.limits import counted
 from pamrs.diagnosis.next_experiment._differences import (
-    Left,
     Linear,
+    ResidualDifference,
     checked_channels,
     difference,
     elsewhere,
@@ -108,7 +108,7 @@ class Outcome:
         Expected information about the model [bit].
     runs : list of Simulation
         One for each hypothesis.
-    left : dict of (int, int) to Left
+    left : dict of (int, int) to ResidualDifference
         What hypothesis j leaves of the outcome of hypothesis i.
     distance : (h, h) array
         Its sum of squares on the effective number of samples.
@@ -126,7 +126,7 @@ class Outcome:
     sensor: str
     bits: float
     runs: list[Simulation]
-    left: dict[tuple[int, int], Left]
+    left: dict[tuple[int, int], ResidualDifference]
     distance: Array
     problems: list[Problem]
     models: list[Linear]
@@ -144,7 +144,7 @@ class Outcome:
         probabilities.
         """
 
-        def missed(pair: tuple[int, int]) -> Left:
+        def missed(pair: tuple[int, int]) -> ResidualDifference:
             i, j = pair
             there = linear(self.problems[i], self.models[j].rig)
             return difference(self.problems[i], self.models[i].found, there, self.weights)
@@ -228,7 +228,7 @@ def outcome_of(
     own = two_at_a_time(lambda one: linear(*one), zip(problems, rigs, strict=True))
     weights = weights_of(problems[0], rigs[0])
 
-    def missed(pair: tuple[int, int]) -> Left:
+    def missed(pair: tuple[int, int]) -> ResidualDifference:
         i, j = pair
         return difference(problems[i], own[i].found, elsewhere(problems[i], own[j]), weights)
 

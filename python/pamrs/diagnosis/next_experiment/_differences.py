@@ -25,10 +25,10 @@ from pamrs.diagnosis.prepare import (
     Prepared,
     Residual,
     available_blocks,
-    begun_alike,
     binned,
     prepare,
     thermometers_of,
+    with_unjudged_starts,
 )
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -184,7 +184,9 @@ def problem_of(
             "and joint_angle where the rig has them"
         )
     core = core_rig(rig)
-    return Problem(blocks, [begun_alike(blocks, core, p) for p in recordings], core, settings)
+    return Problem(
+        blocks, [with_unjudged_starts(blocks, core, p) for p in recordings], core, settings
+    )
 
 
 def judged_alike(problems: Sequence[Problem]) -> list[Problem]:
@@ -204,7 +206,7 @@ def judged_alike(problems: Sequence[Problem]) -> list[Problem]:
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class ResidualDifference:
     """Difference between a model and recordings after its free parameters are fitted out.
 
     Attributes
@@ -283,7 +285,7 @@ def linear(problem: Problem, rig: Rig) -> Linear:
     return Linear(rig, free, residuals(problem, rig, list(free)))
 
 
-def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> Left:
+def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> ResidualDifference:
     """Difference of a model from recordings after its free parameters moved as far as they may."""
     return _left(problem, {key: r.value for key, r in model.found.items()}, model, weights)
 
@@ -301,7 +303,7 @@ def elsewhere(problem: Problem, model: Linear) -> Linear:
 
 def difference(
     problem: Problem, truth: Mapping[Key, Residual], other: Linear, weights: Mapping[Key, float]
-) -> Left:
+) -> ResidualDifference:
     """Difference of a model from the recordings that another one makes, free parameters fitted out.
 
     Parameters
@@ -346,7 +348,7 @@ def bins_of_fit(
 
 def _left(
     problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]
-) -> Left:
+) -> ResidualDifference:
     spread = np.array(list(model.free.values()))
     rows, slopes, scales = [], [], []
     keys: list[Key] = []
@@ -377,4 +379,4 @@ def _left(
         # nothing is left of a recording that ends before its beginning is forgotten
         rms[key] = math.sqrt(float(own @ own) / sizes[key]) if sizes[key] > 0.0 else 0.0
         kept[key] = own / scale if scale > 0.0 else own
-    return Left(rms, kept, float(left @ left + moved @ moved))
+    return ResidualDifference(rms, kept, float(left @ left + moved @ moved))

@@ -26,7 +26,7 @@ from pamrs.diagnosis.next_experiment._differences import (
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan
 from pamrs.diagnosis.next_experiment._words import words
 from pamrs.diagnosis.noise import model_error, noise_levels
-from pamrs.diagnosis.prepare import Block, Prepared, available_blocks, begun_alike
+from pamrs.diagnosis.prepare import Block, Prepared, available_blocks, with_unjudged_starts
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -314,7 +314,9 @@ def _recorded(
         with contextlib.suppress(SimulationError):
             run = experiment.simulate(rig)
             found[name] = [
-                begun_alike(blocks, core_rig(stands), taken(run, stands, name, heard, settings))
+                with_unjudged_starts(
+                    blocks, core_rig(stands), taken(run, stands, name, heard, settings)
+                )
                 for channels, blocks in layers
                 for heard in [{c: v for c, v in noise.items() if c in channels}]
             ]

@@ -42,12 +42,12 @@ def inflated(values: Array, rows: NDArray[np.bool_], width: int, noise: float) -
 
 
 def _inflations(
-    block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
+    block: Block, recordings: list[Prepared], residuals: dict[Key, Residual], width: float
 ) -> dict[Key, float]:
     """Inflation (as of `inflated`) of a block in each recording that has a sample of it."""
     widths = {(block.name, p.recording.name): bin_width(p, width) for p in recordings}
     values = {
-        key: inflated(found[key].value, found[key].rows, count, found[key].noise)
+        key: inflated(residuals[key].value, residuals[key].rows, count, residuals[key].noise)
         for key, count in widths.items()
     }
     return {key: value for key, value in values.items() if value > 0.0}
@@ -55,24 +55,24 @@ def _inflations(
 
 def _most(values: dict[Key, float]) -> float:
     """Largest inflation that counts as usual: 100 times the lower median, or 100; 0 of none."""
-    seen = sorted(values.values())
-    return _APART * max(1.0, seen[(len(seen) - 1) // 2]) if seen else 0.0
+    ordered = sorted(values.values())
+    return _APART * max(1.0, ordered[(len(ordered) - 1) // 2]) if ordered else 0.0
 
 
 def inflation(
-    block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
+    block: Block, recordings: list[Prepared], residuals: dict[Key, Residual], width: float
 ) -> float:
     """Variance of a block's bin means relative to white sample noise, times their correlation time
     (>= 1), without recordings that are far above the others.
     """
-    values = _inflations(block, recordings, found, width)
-    seen = [value for value in values.values() if value <= _most(values)]
-    return max(1.0, float(np.mean(seen))) if seen else 1.0
+    values = _inflations(block, recordings, residuals, width)
+    usual = [value for value in values.values() if value <= _most(values)]
+    return max(1.0, float(np.mean(usual))) if usual else 1.0
 
 
 def apart(
-    block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
+    block: Block, recordings: list[Prepared], residuals: dict[Key, Residual], width: float
 ) -> dict[Key, float]:
     """Inflation of each recording in which it is far larger than in half of them."""
-    values = _inflations(block, recordings, found, width)
+    values = _inflations(block, recordings, residuals, width)
     return {key: value for key, value in values.items() if value > _most(values)}

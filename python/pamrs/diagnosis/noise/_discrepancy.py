@@ -37,7 +37,7 @@ _GAUGES = ("muscle_pressure", "joint_angle")
 _GAUGE_SHARE = 0.1
 """That of a gauge's range over that of a block: gauges are linear to a tenth of a percent."""
 _MOTION = ("joint_angle", "length")
-_COMMANDS = with_trait("driven")
+_DRIVEN_COMMANDS = with_trait("driven")
 
 
 def model_error(rig: Rig, usual: float) -> Stated:
@@ -58,20 +58,20 @@ def model_error(rig: Rig, usual: float) -> Stated:
     stated = rig.model_error
     if not usual:
         return stated
-    told = {channel_of(name) for name in stated}
+    stated_blocks = {channel_of(name) for name in stated}
     shares = dict.fromkeys(_IMPERFECT, usual) | dict.fromkeys(_GAUGES, _GAUGE_SHARE * usual)
-    return {n: {"share": s} for n, s in shares.items() if n not in told} | stated
+    return {n: {"share": s} for n, s in shares.items() if n not in stated_blocks} | stated
 
 
 def operating_ranges(block: Block, recordings: list[Prepared]) -> OperatingRanges:
     """Least value and width of each signal at a block, over all recordings [SI]."""
-    found = {}
+    ranges = {}
     for name in (block.channel, *block.drives):
-        there = [v for p in recordings if (v := _signal(p, name)) is not None]
-        if there:
-            low = min(float(v.min()) for v in there)
-            found[name] = low, max(max(float(v.max()) for v in there) - low, 1e-12)
-    return found
+        signals = [v for p in recordings if (v := _signal(p, name)) is not None]
+        if signals:
+            low = min(float(v.min()) for v in signals)
+            ranges[name] = low, max(max(float(v.max()) for v in signals) - low, 1e-12)
+    return ranges
 
 
 def curves(
@@ -131,9 +131,9 @@ def curves(
         return binned(values, base.rows, width)[0]
 
     columns: list[Array] = []
-    own = _size(stated, block.channel, ranges)
-    if own > 0.0:
-        columns += [means(base.freed(own * curve)) for curve in over(block.channel)]
+    reading_error = _size(stated, block.channel, ranges)
+    if reading_error > 0.0:
+        columns += [means(base.freed(reading_error * curve)) for curve in over(block.channel)]
     for place, share in _flow_errors(block, ranges, stated):
         moved = _flowing(share * np.column_stack(over(place)), base)
         columns += [means(base.freed(column)) for column in moved.T]
@@ -160,25 +160,27 @@ def _size(stated: Stated, name: str, ranges: OperatingRanges) -> float:
     return math.hypot(error.get("size", 0.0), error.get("share", 0.0) * ranges[name][1])
 
 
-def _shares(stated: Stated, kinds: tuple[str, ...], own: str | None = None) -> float:
-    """The shares of some kinds of block together; of those with a name those called `own` alone."""
-    there = [n for n in stated if channel_of(n) in kinds]
-    if own is not None:
-        there = [n for n in there if block_of(n) in ("", own)]
-    return math.hypot(*(stated[n].get("share", 0.0) for n in there))
+def _shares(stated: Stated, kinds: tuple[str, ...], name: str | None = None) -> float:
+    """The shares of some kinds of block together; of named ones those called `name` alone."""
+    named = [n for n in stated if channel_of(n) in kinds]
+    if name is not None:
+        named = [n for n in named if block_of(n) in ("", name)]
+    return math.hypot(*(stated[n].get("share", 0.0) for n in named))
 
 
 def _flow_errors(block: Block, ranges: OperatingRanges, stated: Stated) -> list[tuple[str, float]]:
     """Signals over which errors of the flow into a block are curves, each with its share."""
     if block.kind not in _FLOWS or block.channel not in ranges:
         return []
-    own = block_of(block.channel)
-    command = next((n for n in block.drives if channel_of(n) in _COMMANDS and n in ranges), None)
-    found = [
-        (block.channel, _shares(stated, _FLOWS[block.kind], own)),
-        (command or block.channel, _shares(stated, ("valve",), own)),
+    name = block_of(block.channel)
+    command = next(
+        (n for n in block.drives if channel_of(n) in _DRIVEN_COMMANDS and n in ranges), None
+    )
+    errors = [
+        (block.channel, _shares(stated, _FLOWS[block.kind], name)),
+        (command or block.channel, _shares(stated, ("valve",), name)),
     ]
-    return [(place, share) for place, share in found if share > 0.0]
+    return [(place, share) for place, share in errors if share > 0.0]
 
 
 def _drive_errors(
@@ -189,7 +191,7 @@ def _drive_errors(
     """
     around = (block.channel, *block.drives)
     motion = next((n for n in around if channel_of(n) in _MOTION and n in ranges), None)
-    found = []
+    drive_errors = []
     for name in block.drives:
         if name not in prepared.signals:
             continue
@@ -199,8 +201,8 @@ def _drive_errors(
             most = np.full_like(value, max(abs(low), abs(low + wide)))
             errors.append((motion or name, _shares(stated, _FACTORS), value))
             errors.append((motion or name, _shares(stated, _SUMMANDS), most))
-        found += [(name, place, size * much) for place, size, much in errors if size > 0.0]
-    return found
+        drive_errors += [(name, place, size * much) for place, size, much in errors if size > 0.0]
+    return drive_errors
 
 
 def _flowing(shares: Array, base: Residual) -> Array:
@@ -215,9 +217,9 @@ def _flowing(shares: Array, base: Residual) -> Array:
             continue
         # over rows that are not used it fades as beside them
         level = np.interp(np.arange(b - a), used, np.log(np.abs(q[used, 0])))
-        kept = np.minimum(np.exp(np.diff(level)), 1.0)
+        remembered = np.minimum(np.exp(np.diff(level)), 1.0)
         for i in range(a, b - 1):
-            moved[i + 1] = kept[i - a] * moved[i] + steps[i]
+            moved[i + 1] = remembered[i - a] * moved[i] + steps[i]
     return moved
 
 
@@ -226,7 +228,7 @@ def _carried(
 ) -> Array:
     """Change of a block's output by an error of a drive; zero where the model cannot follow."""
     value, slope = prepared.signals[name]
-    shaken = prepared.shaken({name: (value + more, slope + np.gradient(more, prepared.dt))})
+    shaken = prepared.with_signals({name: (value + more, slope + np.gradient(more, prepared.dt))})
     with contextlib.suppress(SimulationError):
         return change(block, core, shaken, base) - base.value
     return np.zeros_like(value)
@@ -247,8 +249,8 @@ def whitening(curves: Array) -> Callable[[Array], Array]:
         Takes residuals (n,) or sensitivities (n, k).
     """
     power, turn = np.linalg.eigh(curves.T @ curves)
-    kept = power > max(float(power.max(initial=0.0)), 1.0) * power.size * np.finfo(float).eps
-    power, turn = power[kept], turn[:, kept]
+    telling = power > max(float(power.max(initial=0.0)), 1.0) * power.size * np.finfo(float).eps
+    power, turn = power[telling], turn[:, telling]
     axes = curves @ (turn / np.sqrt(power))
     damped = axes * (1.0 - 1.0 / np.sqrt(1.0 + power))
     return lambda rows: np.asarray(rows - damped @ (axes.T @ rows), dtype=np.float64)

@@ -89,9 +89,9 @@ class NoiseLevel:
         """Standard deviation of bin means by noise alone."""
         return math.sqrt(max(0.0, self.noise_variance))
 
-    def curves_in_noises(self, seen: NDArray[np.intp]) -> Array:
+    def curves_in_noises(self, bins: NDArray[np.intp]) -> Array:
         """The curves at some bins (n, k) in units of that noise; no column where there are none."""
-        return np.empty((seen.size, 0)) if self.curves is None else self.curves[seen] / self.noise
+        return np.empty((bins.size, 0)) if self.curves is None else self.curves[bins] / self.noise
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def noise_levels(
     visited : list of Prepared, optional
         Recordings whose ranges the curves of that error run over; those of the problem by default.
     """
-    found: dict[Key, NoiseLevel] = {}
+    levels: dict[Key, NoiseLevel] = {}
     settings, known = problem.settings, stated or {}
     ranges = {
         b.name: operating_ranges(b, visited or problem.recordings) for b in problem.blocks if known
@@ -169,25 +169,26 @@ def noise_levels(
             noisy = [name for name in block.drives if name in prepared.signals]
             rows = base.rows
             _, counts = binned(base.value, rows, width)
-            seen = counts > 0
-            for _ in range(settings.noise_replicates if seen.any() else 0):
-                shaken = np.zeros(prepared.n)
+            usable = counts > 0
+            for _ in range(settings.noise_replicates if usable.any() else 0):
+                disturbed = np.zeros(prepared.n)
                 with contextlib.suppress(
                     SimulationError
                 ):  # a realisation that leaves the model's range tells nothing of the others
-                    shaken = (
-                        change(block, core, _shaken(prepared, noisy, rng), base) - base.value
+                    disturbed = (
+                        change(block, core, _with_more_noise(prepared, noisy, rng), base)
+                        - base.value
                         if noisy
-                        else shaken
+                        else disturbed
                     )
-                means, _ = binned(shaken, rows, width)
-                raw = shaken + base.freed(white_noise.normal(0.0, base.noise, prepared.n))
+                means, _ = binned(disturbed, rows, width)
+                raw = disturbed + base.freed(white_noise.normal(0.0, base.noise, prepared.n))
                 weights.append(inflated(raw, rows, bin_width(prepared, FIT_BIN_TIME), base.noise))
-                own = _own(block, base, prepared, counts, width, rng)[seen]
-                told = (shaken[rows], means[seen], means[seen] + own, own)
-                powers.append([float(np.mean(v**2)) for v in told])
+                own_noise = _own_noise(block, base, prepared, counts, width, rng)[usable]
+                parts = (disturbed[rows], means[usable], means[usable] + own_noise, own_noise)
+                powers.append([float(np.mean(v**2)) for v in parts])
             sample, drives, _, rounded = np.mean(powers, axis=0) if powers else np.zeros(4)
-            white = float(np.mean(1.0 / counts[seen])) if seen.any() else 1.0
+            white = float(np.mean(1.0 / counts[usable])) if usable.any() else 1.0
             single = base.noise**2 * white
             # mean squares of few modes are skew, their logarithms hardly
             scatter = (
@@ -199,36 +200,36 @@ def noise_levels(
             if powers and not {block.channel, *noisy}.isdisjoint(prepared.steps):
                 # where the steps of a converter lie is one number that nobody knows, the same in
                 # all recordings: of each source the realisation that leaves most counts, no mean
-                _, most, _, own_most = np.max(powers, axis=0)
-                noise = max(noise, float(most + own_most))
+                _, most, _, most_own = np.max(powers, axis=0)
+                noise = max(noise, float(most + most_own))
             key = block.name, prepared.recording.name
             bent = None
             if known:
                 bent = curves(block, core, base, prepared, ranges[block.name], known, width)
-            error = 0.0 if bent is None else _power(bent[seen])
-            found[key] = NoiseLevel(
+            error = 0.0 if bent is None else _power(bent[usable])
+            levels[key] = NoiseLevel(
                 math.sqrt(base.noise**2 + sample),
                 scatter=scatter,
                 curves=bent,
                 inflation=max(1.0, float(np.mean(weights))) if weights else 1.0,
                 **_with_error(noise, error),
             )
-    return found
+    return levels
 
 
 def means_in_noises(
-    prepared: Prepared, found: Residual, level: NoiseLevel
+    prepared: Prepared, block_residual: Residual, level: NoiseLevel
 ) -> tuple[NDArray[np.intp], Array]:
     """The bins of a recording that are usable (n,), and the means of a residual in them in units of
     their noise (n,); none where there is no noise.
     """
-    means, counts = binned(found.value, found.rows, bins_of(prepared))
-    seen = np.flatnonzero(counts if level.noise > 0.0 else ())
-    return seen, means[seen] / level.noise if seen.size else np.empty(0)
+    means, counts = binned(block_residual.value, block_residual.rows, bins_of(prepared))
+    usable = np.flatnonzero(counts if level.noise > 0.0 else ())
+    return usable, means[usable] / level.noise if usable.size else np.empty(0)
 
 
 def error_sizes(
-    problem: Problem, found: dict[Key, Residual], noise_level: dict[Key, NoiseLevel]
+    problem: Problem, residuals: dict[Key, Residual], noise_level: dict[Key, NoiseLevel]
 ) -> tuple[dict[str, float], float]:
     """Most probable size of the model's error in each block, as a share of the usual one and at
     most 1, by what a hypothesis leaves; and the log evidence of these sizes.
@@ -241,7 +242,7 @@ def error_sizes(
     ----------
     problem : Problem
         Blocks and recordings.
-    found : dict
+    residuals : dict
         Residuals of the recordings.
     noise_level : dict
         From :func:`noise_levels`, with the curves of the usual error.
@@ -259,12 +260,12 @@ def error_sizes(
         for prepared in problem.recordings:
             key = block.name, prepared.recording.name
             level = noise_level[key]
-            seen, own = means_in_noises(prepared, found[key], level)
-            if level.curves is None or not own.size:
+            usable, means = means_in_noises(prepared, residuals[key], level)
+            if level.curves is None or not means.size:
                 continue
-            rows.append(own)
-            bent.append(level.curves_in_noises(seen))
-            rest.append(np.full(own.size, _CURVE_REST * level.stated / (1.0 - level.stated)))
+            rows.append(means)
+            bent.append(level.curves_in_noises(usable))
+            rest.append(np.full(means.size, _CURVE_REST * level.stated / (1.0 - level.stated)))
         sizes[block.name] = 1.0
         if rows:
             y, c, r = np.concatenate(rows), np.concatenate(bent), np.concatenate(rest)
@@ -282,8 +283,8 @@ def _evidence(rows: Array, curves: Array, rest: Array, size: float) -> float:
     y = rows / np.sqrt(variance)
     c = size * curves / np.sqrt(variance)[:, None]
     normal = np.eye(c.shape[1]) + c.T @ c
-    told = c.T @ y
-    square = float(y @ y - told @ np.linalg.solve(normal, told))
+    projected = c.T @ y
+    square = float(y @ y - projected @ np.linalg.solve(normal, projected))
     volume = float(np.linalg.slogdet(normal)[1] + np.log(variance).sum())
     prior = (math.log(size) / _SIZE_SPREAD) ** 2
     return -0.5 * (square + volume + prior)
@@ -319,7 +320,7 @@ def _power(curves: Array) -> float:
     return float(np.mean(np.sum(curves**2, axis=1))) if curves.size else 0.0
 
 
-def _own(
+def _own_noise(
     block: Block,
     base: Residual,
     prepared: Prepared,
@@ -340,11 +341,13 @@ def _own(
 def _rounding(values: Array, step: float, rng: np.random.Generator) -> Array:
     """Rounding error that a converter, whose steps lie anywhere, adds to values."""
     place = step * rng.uniform()
-    seen = values + place
-    return np.asarray(np.round(seen / step) * step - place - values, dtype=np.float64)
+    placed = values + place
+    return np.asarray(np.round(placed / step) * step - place - values, dtype=np.float64)
 
 
-def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) -> Prepared:
+def _with_more_noise(
+    prepared: Prepared, names: Iterable[str], rng: np.random.Generator
+) -> Prepared:
     """The recording with one more realisation of noise, as smoothed, on some drives."""
     signals = {}
     for name in names:
@@ -357,13 +360,13 @@ def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) 
         )
         more, steeper = smoothed(raw, prepared.dt, prepared.lengths[name])
         signals[name] = (value + more, slope + steeper)
-    return prepared.shaken(signals)
+    return prepared.with_signals(signals)
 
 
 def excess(
     block: Block,
     recordings: list[Prepared],
-    found: dict[Key, Residual],
+    residuals: dict[Key, Residual],
     noise_level: dict[Key, NoiseLevel],
     settings: DiagnosisSettings,
 ) -> Excess:
@@ -376,19 +379,19 @@ def excess(
     width = {p.recording.name: bins_of(p) for p in recordings}
     bins = {
         (key := (block.name, p.recording.name)): binned(
-            found[key].value, found[key].rows, width[p.recording.name]
+            residuals[key].value, residuals[key].rows, width[p.recording.name]
         )
         for p in recordings
     }
     whole = {key: noise_level[key] for key in bins}
-    seen = _pooled(recordings, bins, found, whole, settings)
+    against_all = _pooled(recordings, bins, residuals, whole, settings)
     if all(level.curves is None for level in whole.values()):
-        return seen
+        return against_all
     apart = {
         key: replace(level, binned=level.beside, stated=level.rest) for key, level in whole.items()
     }
-    beside = _pooled(recordings, _beside_curves(bins, apart), found, apart, settings)
-    return max(seen, beside, key=lambda e: e.ratio / e.limit)
+    beside = _pooled(recordings, _beside_curves(bins, apart), residuals, apart, settings)
+    return max(against_all, beside, key=lambda e: e.ratio / e.limit)
 
 
 Bins = dict[Key, tuple[Array, Array]]
@@ -400,16 +403,18 @@ def _beside_curves(bins: Bins, levels: dict[Key, NoiseLevel]) -> Bins:
     curves alone leave the variance of the noise (one curve for all recordings).
     """
     known = [key for key, level in levels.items() if level.curves is not None]
-    seen = {key: bins[key][1] > 0 for key in known}
+    usable = {key: bins[key][1] > 0 for key in known}
     bent = [
-        c[seen[key]] / levels[key].binned for key in known if (c := levels[key].curves) is not None
+        c[usable[key]] / levels[key].binned
+        for key in known
+        if (c := levels[key].curves) is not None
     ]
-    rows = [bins[key][0][seen[key]] / levels[key].binned for key in known]
+    rows = [bins[key][0][usable[key]] / levels[key].binned for key in known]
     white = whitening(np.concatenate(bent))(np.concatenate(rows))
     out, last = dict(bins), 0
     for key, part in zip(known, rows, strict=True):
         means = np.zeros_like(bins[key][0])
-        means[seen[key]] = levels[key].binned * white[last : last + part.size]
+        means[usable[key]] = levels[key].binned * white[last : last + part.size]
         out[key], last = (means, bins[key][1]), last + part.size
     return out
 
@@ -417,7 +422,7 @@ def _beside_curves(bins: Bins, levels: dict[Key, NoiseLevel]) -> Bins:
 def _pooled(
     recordings: list[Prepared],
     bins: Bins,
-    found: dict[Key, Residual],
+    residuals: dict[Key, Residual],
     noise_level: dict[Key, NoiseLevel],
     settings: DiagnosisSettings,
 ) -> Excess:
@@ -426,13 +431,13 @@ def _pooled(
     ratios, weights, squares, noises, beyond_noise = [], [], [], [], []
     pieces: list[tuple[float, int]] = []
     for prepared, (key, (means, counts)) in zip(recordings, bins.items(), strict=True):
-        r = found[key]
+        r = residuals[key]
         length = max(1, round(PIECE_TIME / (bins_of(prepared) * prepared.dt)))
-        own = noise_level[key].binned ** 2
+        variance = noise_level[key].binned ** 2
         for first in range(0, means.size, length):
-            there = means[first : first + length][counts[first : first + length] > 0]
-            if there.size:
-                pieces.append((float(np.mean(there**2)) / own, int(there.size)))
+            piece = means[first : first + length][counts[first : first + length] > 0]
+            if piece.size:
+                pieces.append((float(np.mean(piece**2)) / variance, int(piece.size)))
         means = means[counts > 0]
         if means.size == 0:
             continue

@@ -2,39 +2,46 @@
 from their measured neighbours.
 
 Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `averaged_to_need`
-(long recordings), `overlap`, `without_copies`, `Overlap`
-(recordings that hold the same samples),
+(long recordings), `overlap`, `without_copies`, `Overlap` (recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible`, `without_dead_commands`, `without_impossible`,
-`without_rails`,
-`suspected_units` (what recordings cannot be), `uncommanded`, `unusable` (which cannot be used),
-`prepare`, `Prepared`, `binned`, `noise_level`,
-`smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Input`, `Residual`,
-`available_blocks`, `Unjudged`, `unjudged_blocks` (blocks that the channels do not tell), `begun`,
-`change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`,
-`said_of_warm_starts` (beginnings that nobody measured), `blocks_beside_tanks`, `unread_tanks`,
-`with_tanks`, `said_of_tanks` (tanks without a gauge, which are simulated), `own_of_rig`, `varying`,
-`with_own_values`, `said_of_own` (values that are free in each recording), `said_of_slack` (muscles
-that do not push back).
+`without_rails`, `suspected_units` (what recordings cannot be), `uncommanded`, `unusable` (which
+cannot be used), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`, `thermometers_of`,
+`warm_chambers` (signals), `Block`, `Input`, `Residual`, `available_blocks`, `Unjudged`,
+`unjudged_blocks` (blocks that the channels do not tell), `signals_at_starts`, `change`,
+`predicted`, `residual` (blocks and their residuals), `with_unjudged_starts`, `notes_on_beginnings`,
+`notes_on_warm_starts` (beginnings that nobody measured), `blocks_with_tanks`,
+`tanks_without_gauge`, `with_tanks`, `notes_on_tanks` (tanks without a gauge, which are simulated),
+`with_declared_values`, `varying`, `with_own_values`, `notes_on_own_values` (values that are free in
+each recording), `notes_on_slack` (muscles that do not push back).
 """
 
 from pamrs.diagnosis.prepare._ambient import AMBIENT, AMBIENT_PRESSURE, at_ambient
 from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
-from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings, said_of_warm_starts
+from pamrs.diagnosis.prepare._beginning import (
+    notes_on_beginnings,
+    notes_on_warm_starts,
+    with_unjudged_starts,
+)
 from pamrs.diagnosis.prepare._blocks import (
     Block,
     Input,
     Residual,
     Unjudged,
     available_blocks,
-    begun,
     change,
     predicted,
     residual,
+    signals_at_starts,
     unjudged_blocks,
 )
 from pamrs.diagnosis.prepare._overlap import Overlap, overlap, without_copies
-from pamrs.diagnosis.prepare._own import own_of_rig, said_of_own, varying, with_own_values
-from pamrs.diagnosis.prepare._plausible import (
+from pamrs.diagnosis.prepare._own_values import (
+    notes_on_own_values,
+    varying,
+    with_declared_values,
+    with_own_values,
+)
+from pamrs.diagnosis.prepare._plausibility import (
     check_plausible,
     check_sense,
     implausible,
@@ -53,14 +60,14 @@ from pamrs.diagnosis.prepare._signals import (
     unusable,
     warm_chambers,
 )
-from pamrs.diagnosis.prepare._slack import said_of_slack
-from pamrs.diagnosis.prepare._units import noted_units, suspected_units
-from pamrs.diagnosis.prepare._unread import (
-    blocks_beside_tanks,
-    said_of_tanks,
-    unread_tanks,
+from pamrs.diagnosis.prepare._slack_muscles import notes_on_slack
+from pamrs.diagnosis.prepare._tanks import (
+    blocks_with_tanks,
+    notes_on_tanks,
+    tanks_without_gauge,
     with_tanks,
 )
+from pamrs.diagnosis.prepare._units import noted_units, suspected_units
 
 __all__ = [
     "AMBIENT",
@@ -75,10 +82,10 @@ __all__ = [
     "available_blocks",
     "averaged",
     "averaged_to_need",
-    "begun",
-    "begun_alike",
+    "signals_at_starts",
+    "with_unjudged_starts",
     "binned",
-    "blocks_beside_tanks",
+    "blocks_with_tanks",
     "change",
     "check_plausible",
     "check_sense",
@@ -86,21 +93,21 @@ __all__ = [
     "noise_level",
     "noted_units",
     "overlap",
-    "own_of_rig",
+    "with_declared_values",
     "predicted",
     "prepare",
     "residual",
-    "said_of_beginnings",
-    "said_of_warm_starts",
-    "said_of_own",
-    "said_of_slack",
-    "said_of_tanks",
+    "notes_on_beginnings",
+    "notes_on_warm_starts",
+    "notes_on_own_values",
+    "notes_on_slack",
+    "notes_on_tanks",
     "smoothed",
     "suspected_units",
     "thermometers_of",
     "unjudged_blocks",
     "uncommanded",
-    "unread_tanks",
+    "tanks_without_gauge",
     "unusable",
     "varying",
     "warm_chambers",

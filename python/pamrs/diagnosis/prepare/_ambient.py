@@ -47,7 +47,7 @@ def at_ambient(
     Returns
     -------
     rig : Rig
-    said : list of str
+    notes : list of str
         What was set, in words, and what makes one doubt it.
 
     Raises
@@ -55,41 +55,41 @@ def at_ambient(
     DiagnosisError
         If no room, or no rig, can have a temperature.
     """
-    found = [
+    medians = [
         (r.name, float(np.median(values[good])))
         for r in recordings
         for name, values in r.channels.items()
         if channel_of(name) == AMBIENT and (good := r.mask[name] & np.isfinite(values)).any()
     ]
-    if not found:
+    if not medians:
         return rig, []
     low, high = settings.least_room, settings.most_room
-    wrong = [f"{name} ({value:.1f} K)" for name, value in found if not low <= value <= high]
+    wrong = [f"{name} ({value:.1f} K)" for name, value in medians if not low <= value <= high]
     if wrong:
         raise DiagnosisError(
             f"{AMBIENT} of {', '.join(wrong)}: no room has it, {low:g} to {high:g} K are allowed; "
             "correct its unit or calibration, or leave the channel out"
         )
-    value = float(np.median([one for _, one in found]))
+    value = float(np.median([one for _, one in medians]))
     before = rig.parameter(_NAME)
     try:
         moved = rig.with_parameters({_NAME: value})
     except ParameterError as error:
-        names = ", ".join(name for name, _ in found)
+        names = ", ".join(name for name, _ in medians)
         raise DiagnosisError(f"{AMBIENT} of {names}: {error}") from error
     same = abs(value - before.value) < _SAME
     stated = f"to {_SAME:g} K the rig file's" if same else f"{before.value:.5g} K in the rig file"
-    said = [
+    notes = [
         f"{_NAME} is {value:.5g} K, as {AMBIENT} was measured ({stated})",
         *_doubted(value, before, settings),
     ]
-    low, high = min(one for _, one in found), max(one for _, one in found)
+    low, high = min(one for _, one in medians), max(one for _, one in medians)
     if high - low > _MOST_ROOM_SPREAD:
-        said.append(
+        notes.append(
             f"{AMBIENT} differs between the recordings, from {low:.1f} to {high:.1f} K; all of "
             f"them are judged at {value:.5g} K"
         )
-    return moved, said
+    return moved, notes
 
 
 def _doubted(value: float, stated: Parameter, settings: DiagnosisSettings) -> list[str]:

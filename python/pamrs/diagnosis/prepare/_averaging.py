@@ -10,7 +10,7 @@ import numpy as np
 from pamrs._arrays import Array, Mask
 from pamrs.channels import channel_of
 from pamrs.diagnosis.prepare._blocks import Block
-from pamrs.diagnosis.prepare._signals import COMMANDS, held
+from pamrs.diagnosis.prepare._signals import DRIVEN_COMMANDS, held
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
@@ -19,7 +19,7 @@ from pamrs.recordings import Recording
 _NEEDED_SEALED_SAMPLE_TIME = 0.1
 
 
-_HELD = (*COMMANDS, "reference")
+_HELD = (*DRIVEN_COMMANDS, "reference")
 """Entry ``k`` holds from sample ``k`` to the next, where a measured one is of its instant."""
 
 
@@ -58,16 +58,16 @@ def averaged_to_need(
     counts = [
         _odd(min(needed / r.sample_time, len(r) / settings.ample_samples)) for r in recordings
     ]
-    found = [averaged(r, count) for r, count in zip(recordings, counts, strict=True)]
-    total = sum(len(r) for r in found)
+    shortened = [averaged(r, count) for r, count in zip(recordings, counts, strict=True)]
+    total = sum(len(r) for r in shortened)
     if total > settings.most_samples:
-        longest = max(found, key=len)
+        longest = max(shortened, key=len)
         raise DiagnosisError(
             f"case {case!r}: its recordings have {total} samples at the rate that its blocks need; "
             f"at most {settings.most_samples} are diagnosed at a time: choose parts by start and "
             f"stop in case.toml (the longest is {longest.name!r}, {longest.duration:.4g} s)"
         )
-    return found, counts
+    return shortened, counts
 
 
 def _odd(ratio: float) -> int:
@@ -105,7 +105,7 @@ def averaged(recording: Recording, count: int) -> Recording:
         first = half if channel_of(name) in _HELD else 0
         rows = slice(first, first + size * count)
         good = recording.mask[name][rows].reshape(size, count)
-        if channel_of(name) in COMMANDS and good.any():
+        if channel_of(name) in DRIVEN_COMMANDS and good.any():
             commands[name] = held(values, recording.mask[name])[rows]
         parts = np.where(good, values[rows].reshape(size, count), 0.0)
         usable = 2 * good.sum(axis=1) > count

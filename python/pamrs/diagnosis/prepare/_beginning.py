@@ -19,7 +19,6 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array, Index, Mask
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._blocks import (
     WINDOW_SAMPLES_PER_STATE,
     Block,
@@ -29,6 +28,7 @@ from pamrs.diagnosis.prepare._blocks import (
     residual,
 )
 from pamrs.diagnosis.prepare._signals import Prepared
+from pamrs.diagnosis.prepare._time_before import TimeBefore
 from pamrs.errors import SimulationError
 from pamrs.rig.schema import qualified
 
@@ -53,7 +53,7 @@ _REST_LIKELIHOOD = 1000.0
 Tolerances = Mapping[str, float]
 
 
-def begun_alike(
+def with_unjudged_starts(
     blocks: Sequence[Block],
     core: _core.Rig,
     prepared: Prepared,
@@ -83,19 +83,27 @@ def begun_alike(
     beginnings = _Beginnings(blocks, core, prepared)
     counts = {block.channel: beginnings.remembered(block) for block in blocks}
     unsettled = {channel: count for channel, count in counts.items() if count > 0}
-    prepared = replace(prepared, unsettled=unsettled, unheard=_unheard(blocks, core, prepared))
+    prepared = replace(
+        prepared, unsettled=unsettled, after_holes=_rows_after_holes(blocks, core, prepared)
+    )
     moving = [block for block in blocks if block.mechanical and block.window is not None]
-    rests = [block.channel for block in moving if _rests(block, core, prepared, tolerances or {})]
-    return replace(prepared, at_rest=frozenset(rests), _begun={}) if rests else prepared
+    rests = [
+        block.channel
+        for block in moving
+        if _begins_at_rest(block, core, prepared, tolerances or {})
+    ]
+    return replace(prepared, at_rest=frozenset(rests), _start_states={}) if rests else prepared
 
 
-def _unheard(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> dict[str, Mask]:
+def _rows_after_holes(
+    blocks: Sequence[Block], core: _core.Rig, prepared: Prepared
+) -> dict[str, Mask]:
     """Rows of each channel that show when a command changed in a hole, which nobody recorded: what
     is not measured behind it (a regulator's outlet, a spool, the flow in a tube) went on there.
     """
-    early, found = prepared.commanded_early(), dict[str, Mask]()
+    early, rows_of = prepared.commanded_early(), dict[str, Mask]()
     if early is None:
-        return found
+        return rows_of
     for block in blocks:
         try:
             apart = predicted(block, core, early) - predicted(block, core, prepared)
@@ -103,25 +111,27 @@ def _unheard(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> di
             continue  # the fit says what cannot be predicted
         shown = np.abs(apart) > _OUTLET_NOISES * prepared.noise[block.channel]
         if shown.any():
-            found[block.channel] = shown
-    return found
+            rows_of[block.channel] = shown
+    return rows_of
 
 
-def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances) -> bool:
+def _begins_at_rest(
+    block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances
+) -> bool:
     """True where the model follows a motion better from rest than from its first samples' speed.
 
     A joint on its stop that is given a speed, by the noise of a few samples, bounces, and what a
     window is freed of is linear in where it starts.
     """
-    left = []
+    missed = []
     for channels in (frozenset[str](), frozenset({block.channel})):
-        there = replace(prepared, at_rest=channels, _begun={})
-        left.append(_left_at_first(block, core, there, tolerances))
-    seen, still = left
-    return seen - still > _STILL_DEVIATIONS**2
+        from_start = replace(prepared, at_rest=channels, _start_states={})
+        missed.append(_first_window_misfit(block, core, from_start, tolerances))
+    from_speed, from_rest = missed
+    return from_speed - from_rest > _STILL_DEVIATIONS**2
 
 
-def _left_at_first(
+def _first_window_misfit(
     block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances
 ) -> float:
     """Chi-square that the first window of a block keeps, its parameters free inside their
@@ -132,14 +142,14 @@ def _left_at_first(
         return math.nan
     tol = np.array([tolerances[n] for n in names])
     try:
-        found = residual(block, core, prepared, names)
+        with_slopes = residual(block, core, prepared, names)
     except SimulationError:
         return math.nan
-    if found.jacobian is None or not found.starts or found.starts[0][0] > 0:
+    if with_slopes.jacobian is None or not with_slopes.starts or with_slopes.starts[0][0] > 0:
         return math.nan
-    last = found.starts[0][1]
-    slopes = np.vstack([found.jacobian[:last] * tol / found.noise, np.eye(tol.size)])
-    rows = np.concatenate([found.value[:last] / found.noise, np.zeros(tol.size)])
+    last = with_slopes.starts[0][1]
+    slopes = np.vstack([with_slopes.jacobian[:last] * tol / with_slopes.noise, np.eye(tol.size)])
+    rows = np.concatenate([with_slopes.value[:last] / with_slopes.noise, np.zeros(tol.size)])
     rows = rows - slopes @ np.linalg.lstsq(slopes, rows)[0]
     return float(rows @ rows)
 
@@ -157,40 +167,47 @@ class _Beginnings:
     def __init__(self, blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> None:
         self.core, self.prepared = core, prepared
         self.at = {block.channel: block for block in blocks}
-        self._kept: dict[tuple[str, bool], Array] = {}
+        self._predictions: dict[tuple[str, bool], Array] = {}
 
     def remembered(self, block: Block) -> int:
         """Samples up to the last one that shows how what nobody measured in a block began."""
         return max(
-            self._last(block, self._by_outlets(block)) if _set(block) and block.beside else 0,
-            self._last(block, self._by_tubes(block)) if block.tubes else 0,
+            self._last_sample(block, self._change_by_outlets(block))
+            if _regulator_commands(block) and block.beside
+            else 0,
+            self._last_sample(block, self._change_by_tubes(block)) if block.tubes else 0,
         )
 
-    def _last(self, block: Block, apart: Array) -> int:
+    def _last_sample(self, block: Block, apart: Array) -> int:
         """Samples up to the last one at which two predictions can be told apart."""
         most = _OUTLET_NOISES * self.prepared.noise[block.channel]
-        seen = np.flatnonzero(np.abs(apart) > most)
-        return int(seen[-1]) + 1 if seen.size else 0
+        shown = np.flatnonzero(np.abs(apart) > most)
+        return int(shown[-1]) + 1 if shown.size else 0
 
-    def _by_outlets(self, block: Block) -> Array:
+    def _change_by_outlets(self, block: Block) -> Array:
         """Change of a prediction if regulators begin at their set pressures."""
         prepared = self.prepared
         outlets = {
             qualified("supply", block_of(name)): max(0.0, float(prepared.held[name][0]))
-            for name in _set(block)
+            for name in _regulator_commands(block)
         }
         try:
-            return predicted(block, self.core, prepared, outlets) - self._from(block, moving=False)
+            return predicted(block, self.core, prepared, outlets) - self._predicted_from(
+                block, moving=False
+            )
         except SimulationError:
             return np.zeros(0)  # the fit says what cannot be predicted
 
-    def _by_tubes(self, block: Block) -> Array:
+    def _change_by_tubes(self, block: Block) -> Array:
         """Change of a prediction if air flowed through tubes before; empty where it did not."""
         try:
-            apart = self._from(block, moving=True) - self._from(block, moving=False)
+            apart = self._predicted_from(block, moving=True) - self._predicted_from(
+                block, moving=False
+            )
             little = np.abs(apart).max() <= _STILL_NOISES * self.prepared.noise[block.channel]
             at_rest = all(
-                (little and self._stands_still(tube)) or self._waits(tube) for tube in block.tubes
+                (little and self._stands_still(tube)) or self._is_opened_at_rest(tube)
+                for tube in block.tubes
             )
         except SimulationError:
             return np.zeros(0)
@@ -211,21 +228,25 @@ class _Beginnings:
                 return False
         return bool(names)
 
-    def _waits(self, tube: Tube) -> bool:
+    def _is_opened_at_rest(self, tube: Tube) -> bool:
         """True where a tube at rest is opened as the recording begins: until its ends hear of each
         other, `to` stands still, and neither moves as it would in a flow.
         """
         early = int(_SILENT_DELAYS * tube.delay / self.prepared.dt)
         ends = [name for name in (tube.end, tube.beginning) if name in self.at]
-        tells = [told for name in ends if (told := self._tells(name, early)) is not None]
-        if tube.end not in ends or len(tells) < len(ends):
+        evidences = [
+            evidence
+            for name in ends
+            if (evidence := self._evidence_of_rest(name, early)) is not None
+        ]
+        if tube.end not in ends or len(evidences) < len(ends):
             return False
-        fits, _ = tells[0]
-        likely = [more for _, more in tells]
+        fits, _ = evidences[0]
+        likely = [more for _, more in evidences]
         least = math.log(_REST_LIKELIHOOD)
         return fits and min(likely) > least
 
-    def _tells(self, channel: str, early: int) -> tuple[bool, float] | None:
+    def _evidence_of_rest(self, channel: str, early: int) -> tuple[bool, float] | None:
         """True for first samples of a channel that fit a rest, and the log likelihood of rest
         against flow; None where there are too few samples.
         """
@@ -235,51 +256,51 @@ class _Beginnings:
         read = self.prepared.recording.channels[channel][:early][rows]
 
         def missed(moving: bool) -> float:
-            left = read - self._from(self.at[channel], moving=moving)[:early][rows]
-            return float(np.var(left)) * left.size / self.prepared.noise[channel] ** 2
+            rest = read - self._predicted_from(self.at[channel], moving=moving)[:early][rows]
+            return float(np.var(rest)) * rest.size / self.prepared.noise[channel] ** 2
 
         rest, freedom = missed(False), read.size - 1
         return rest < freedom + 3.0 * math.sqrt(2.0 * freedom), 0.5 * (missed(True) - rest)
 
-    def _from(self, block: Block, *, moving: bool) -> Array:
+    def _predicted_from(self, block: Block, *, moving: bool) -> Array:
         """Prediction of a block whose tubes began at rest, or as a flow leaves them."""
         key = (block.name, moving)
-        if key not in self._kept:
+        if key not in self._predictions:
             longest = max((tube.delay for tube in block.tubes), default=0.0) / self.prepared.dt
-            before = Before(
+            before = TimeBefore(
                 math.ceil(_FLOW_DELAYS * longest),
                 math.ceil(_MOVING_DELAYS * longest),
             )
-            self._kept[key] = predicted(
+            self._predictions[key] = predicted(
                 block, self.core, self.prepared, before=before if moving else None
             )
-        return self._kept[key]
+        return self._predictions[key]
 
 
-def _set(block: Block) -> list[str]:
+def _regulator_commands(block: Block) -> list[str]:
     """Commands of the regulators that a block is driven by."""
     return [name for name in block.drives if channel_of(name) == "supply_command"]
 
 
 def _unmeasured(block: Block) -> str:
     """Words on what nobody measured in a block, and on what would measure it."""
-    told = []
-    if _set(block) and block.beside:
-        gauges = [dotted("supply_pressure", block_of(name)) for name in _set(block)]
-        told.append(
+    reasons = []
+    if _regulator_commands(block) and block.beside:
+        gauges = [dotted("supply_pressure", block_of(name)) for name in _regulator_commands(block)]
+        reasons.append(
             "they show where the regulator began, and nobody measured that (a gauge for "
             f"{' or '.join(gauges)} would)"
         )
     if block.tubes:
         tubes = " and ".join(tube.name for tube in block.tubes)
-        told.append(
+        reasons.append(
             f"they show what flowed through {tubes} before, and nobody measured that (a recording "
             "that begins at rest needs not know)"
         )
-    return ", or ".join(told)
+    return ", or ".join(reasons)
 
 
-def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
+def notes_on_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
     """Sentences on beginnings that are not judged.
 
     Parameters
@@ -294,31 +315,33 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
     list of str
         A sentence for each block.
     """
-    said = []
+    notes = []
     each = {p.recording.name: p for p in recordings}.values()
     for block in blocks:
-        own = [p for p in each if p.unsettled.get(block.channel)]
-        if own:
-            told = ", ".join(
-                f"{p.unsettled[block.channel] * p.dt:.3g} s of {p.recording.name}" for p in own
+        having = [p for p in each if p.unsettled.get(block.channel)]
+        if having:
+            times = ", ".join(
+                f"{p.unsettled[block.channel] * p.dt:.3g} s of {p.recording.name}" for p in having
             )
-            said.append(
-                f"block {block.name}: the first {told} were not judged: {_unmeasured(block)}"
+            notes.append(
+                f"block {block.name}: the first {times} were not judged: {_unmeasured(block)}"
             )
-        heard = [(p, p.unheard[block.channel].sum()) for p in each if block.channel in p.unheard]
+        heard = [
+            (p, p.after_holes[block.channel].sum()) for p in each if block.channel in p.after_holes
+        ]
         if heard:
-            told = ", ".join(f"{count * p.dt:.3g} s of {p.recording.name}" for p, count in heard)
-            said.append(
-                f"block {block.name}: {told} were not judged: a command changed in a hole of the "
+            times = ", ".join(f"{count * p.dt:.3g} s of {p.recording.name}" for p, count in heard)
+            notes.append(
+                f"block {block.name}: {times} were not judged: a command changed in a hole of the "
                 "log, and nobody recorded when"
             )
-    return said
+    return notes
 
 
-def said_of_warm_starts(
+def notes_on_warm_starts(
     blocks: Sequence[Block],
     recordings: Sequence[Prepared],
-    found: Mapping[tuple[str, str], Residual],
+    residuals: Mapping[tuple[str, str], Residual],
 ) -> list[str]:
     """Gases that began clearly warmer or colder than the room, in words: a sentence for each block.
 
@@ -328,21 +351,21 @@ def said_of_warm_starts(
         Those that are judged.
     recordings : sequence of Prepared
         Those of a case; one that is there twice counts once.
-    found : mapping
+    residuals : mapping
         Residuals of the final model, by block and recording.
     """
-    said = []
+    notes = []
     for block in blocks:
         away = {
             p.recording.name: (kelvin - block.warm.room, p.settings.begun_temperature_error)
             for p in recordings
-            if (kelvin := found[block.name, p.recording.name].temperature) is not None
+            if (kelvin := residuals[block.name, p.recording.name].temperature) is not None
             and block.warm is not None
         }
         clear = [f"{k:+.0f} K in {name}" for name, (k, least) in away.items() if abs(k) > least]
         if clear:
-            said.append(
+            notes.append(
                 f"block {block.name}: recordings begin in a transient; the temperature of the gas "
                 f"there is fitted, and differs from the room's by about {', '.join(clear)}"
             )
-    return said
+    return notes

@@ -14,8 +14,8 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array, Mask
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of, thermometers_of
+from pamrs.diagnosis.prepare._time_before import TimeBefore
 from pamrs.effects import CLOSURE_OF
 from pamrs.rig import Rig
 from pamrs.rig.schema import keys_of, qualified
@@ -212,7 +212,7 @@ def _not_recorded(names: Iterable[str]) -> str:
     return f"{', '.join(named)} {'is' if few else 'are'} not in every recording"
 
 
-_PRESSURE = {
+_GAUGE_OF = {
     "supply": "supply_pressure",
     "line": "line_pressure",
     "chamber": "muscle_pressure",
@@ -221,7 +221,7 @@ _PRESSURE = {
 
 
 @dataclass(frozen=True)
-class _Way:
+class _FlowPath:
     """A valve or a line: its own full name, what it leads from and to (chambers, supplies and
     inlets of lines with a gauge, in full), the command that opens it, the line behind it.
     """
@@ -232,40 +232,42 @@ class _Way:
     between: tuple[str, ...]
 
 
-def _ways(rig: Rig, has: frozenset[str]) -> list[_Way]:
-    """Every way of the air; a valve and the line behind it are one, unless a gauge stands between
-    them.
+def _flow_paths(rig: Rig, has: frozenset[str]) -> list[_FlowPath]:
+    """All flow paths of the air; a valve and the line behind it are one, unless a gauge stands
+    between them.
     """
     valves, lines = rig.ports("valve"), rig.ports("line")
     cut = {n: not e["from"] and dotted("line_pressure", n) in has for n, e in lines.items()}
     behind = {qualified("line", n): ends["to"] for n, ends in lines.items() if not cut[n]}
-    found = []
+    paths = []
     for name, ends in valves.items():
         line = (ends["to"],) if ends["to"] in behind else ()
         end = behind.get(ends["to"], ends["to"])
-        found.append(
-            _Way(
+        paths.append(
+            _FlowPath(
                 qualified("valve", name),
                 (ends["from"], end),
                 (dotted("valve_command", name),),
                 line,
             )
         )
-    found += [
-        _Way(qualified("line", name), (ends["from"] or qualified("line", name), ends["to"]), (), ())
+    paths += [
+        _FlowPath(
+            qualified("line", name), (ends["from"] or qualified("line", name), ends["to"]), (), ()
+        )
         for name, ends in lines.items()
         if ends["from"] or cut[name]
     ]
-    return found
+    return paths
 
 
-class _Map:
+class _BlockMap:
     """Channels and parameters that belong to each block of a rig."""
 
     def __init__(self, rig: Rig, channels: tuple[str, ...]) -> None:
         self.rig, self.has = rig, frozenset(channels)
         self.thermometers = {n: c for n, c in thermometers_of(rig).items() if c in self.has}
-        self.ways = _ways(rig, self.has)
+        self.paths = _flow_paths(rig, self.has)
         self.angles = (
             ("length",)
             if rig.model["load"]
@@ -281,23 +283,23 @@ class _Map:
     def pressure(self, block: str) -> str:
         """Channel of the pressure of a supply, a chamber or a line's inlet by its full name."""
         kind, _, name = block.partition(".")
-        return dotted(_PRESSURE[kind], name)
+        return dotted(_GAUGE_OF[kind], name)
 
-    def around(self, block: str) -> list[_Way]:
-        """The ways that begin or end at a supply, a chamber or a line's inlet."""
-        return [way for way in self.ways if block in way.ends]
+    def around(self, block: str) -> list[_FlowPath]:
+        """The flow paths that begin or end at a supply, a chamber or a line's inlet."""
+        return [path for path in self.paths if block in path.ends]
 
     def neighbours(self, block: str) -> tuple[str, ...]:
         """Channels of the pressures next to a block; that of a constant supply is known without
         measuring it.
         """
         others = [
-            end for way in self.around(block) for end in way.ends if end not in (block, "ambient")
+            end for path in self.around(block) for end in path.ends if end not in (block, "ambient")
         ]
-        known = [end for end in others if self._unread(end, "constant", "regulator")]
+        known = [end for end in others if self._lacks_gauge(end, "constant", "regulator")]
         return tuple(dict.fromkeys(self.pressure(end) for end in others if end not in known))
 
-    def _unread(self, block: str, *kinds: str) -> bool:
+    def _lacks_gauge(self, block: str, *kinds: str) -> bool:
         """True where a block is a supply of one of these kinds whose pressure nobody measured."""
         block_kind, _, name = block.partition(".")
         return (
@@ -306,12 +308,12 @@ class _Map:
             and self.pressure(block) not in self.has
         )
 
-    def unread(self, block: str) -> list[str]:
+    def without_gauge(self, block: str) -> list[str]:
         """Names of the regulators next to a chamber whose outlet nobody measured: their command
         says what it is.
         """
-        ends = dict.fromkeys(end for way in self.around(block) for end in way.ends)
-        return [block_of(end) for end in ends if self._unread(end, "regulator")]
+        ends = dict.fromkeys(end for path in self.around(block) for end in path.ends)
+        return [block_of(end) for end in ends if self._lacks_gauge(end, "regulator")]
 
     def behind(self, supply: str) -> list[str]:
         """Names of the regulators whose inlet a supply is: what they let through is drawn from
@@ -329,7 +331,7 @@ class _Map:
     def commands(self, block: str) -> tuple[str, ...]:
         """Commands of the valves at a block."""
         return tuple(
-            dict.fromkeys(command for way in self.around(block) for command in way.command)
+            dict.fromkeys(command for path in self.around(block) for command in path.command)
         )
 
     def moved(self, block: str, *names: str) -> set[str]:
@@ -344,8 +346,8 @@ class _Map:
 
     def zero(self, key: str, name: str) -> str:
         """Dotted name of the zero of a block's sensor, its own or the common one."""
-        own = self.rig.tables("sensors")
-        return f"sensors.{name}.{key}" if name and name in own else f"sensors.{key}"
+        sensors = self.rig.tables("sensors")
+        return f"sensors.{name}.{key}" if name and name in sensors else f"sensors.{key}"
 
     def zeros(self, nodes: Iterable[str], joints: Iterable[str]) -> set[str]:
         """Zeros of the gauges at chambers, supplies and inlets of lines, given by their full names,
@@ -366,48 +368,48 @@ class _Map:
 
     def of(self, kind: str, *names: str) -> set[str]:
         """All parameters of some blocks of a kind."""
-        own = tuple(f"{qualified(kind, name)}." for name in names)
-        return {name for name in self.rig.parameters if name.startswith(own)}
+        prefixes = tuple(f"{qualified(kind, name)}." for name in names)
+        return {name for name in self.rig.parameters if name.startswith(prefixes)}
 
     def of_motion(self, joints: Iterable[str]) -> set[str]:
         """Parameters of what turns the lengths of muscles into the angles of some joints."""
-        there = set(joints)
-        pulling = [m for m, joint in self.joint_of.items() if joint in there]
-        return self.of("joint", *there) | self.of("transmission", *pulling)
+        named = set(joints)
+        pulling = [m for m, joint in self.joint_of.items() if joint in named]
+        return self.of("joint", *named) | self.of("transmission", *pulling)
 
-    def of_ways(self, block: str) -> set[str]:
+    def of_paths(self, block: str) -> set[str]:
         """Parameters of the valves and lines at a block."""
         names: set[str] = set()
-        for way in self.around(block):
-            for full in (way.name, *way.between):
+        for path in self.around(block):
+            for full in (path.name, *path.between):
                 kind, _, name = full.partition(".")
                 names |= self.moved(kind, name)
         return names
 
     def tubes_at(self, block: str) -> tuple[Tube, ...]:
-        """The tubes of segments among the ways at a block."""
+        """The tubes of segments among the flow paths at a block."""
         gas = self.rig.tables("gas")[""]
-        ends, found = self.rig.ports("line"), []
-        full = (name for way in self.around(block) for name in (way.name, *way.between))
+        ends, tubes = self.rig.ports("line"), []
+        full = (name for path in self.around(block) for name in (path.name, *path.between))
         for name in dict.fromkeys(full):
-            kind, _, own = name.partition(".")
-            table = self.rig.tables(kind)[own]
+            kind, _, place = name.partition(".")
+            table = self.rig.tables(kind)[place]
             if kind != "line" or not table.get("segments"):
                 continue
             sound = math.sqrt(table["alpha"] * gas["gas_constant"] * gas["temperature"])
             beginning, end = (
                 self.pressure(node) if node not in ("", "ambient") else ""
-                for node in (ends[own]["from"], ends[own]["to"])
+                for node in (ends[place]["from"], ends[place]["to"])
             )
-            found.append(Tube(name, beginning, end, table["length"] / sound))
-        return tuple(found)
+            tubes.append(Tube(name, beginning, end, table["length"] / sound))
+        return tuple(tubes)
 
     def nodes_at(self, block: str) -> set[str]:
         """Chambers, supplies and inlets of lines at which a block is cut, by their full names:
-        itself, where its ways lead, and what feeds a regulator that it simulates.
+        itself, where its flow paths lead, and what feeds a regulator that it simulates.
         """
-        ends = {block, *(end for way in self.around(block) for end in way.ends)} - {"ambient"}
-        simulated = [e for e in ends if e == block or self._unread(e, "regulator")]
+        ends = {block, *(end for path in self.around(block) for end in path.ends)} - {"ambient"}
+        simulated = [e for e in ends if e == block or self._lacks_gauge(e, "regulator")]
         supplies = self.rig.ports("supply")
         inlets = [
             supplies.get(block_of(e), {}).get("inlet", "")
@@ -427,16 +429,18 @@ class _Map:
         """
         full, table = qualified("supply", name), self.rig.tables("supply")[name]
         behind = self.behind(full)
-        unread = [one for one in behind if self._unread(qualified("supply", one), "regulator")]
-        own = [name] if table["kind"] == "regulator" else []
+        without_gauge = [
+            one for one in behind if self._lacks_gauge(qualified("supply", one), "regulator")
+        ]
+        itself = [name] if table["kind"] == "regulator" else []
         nodes = (full, *(qualified("supply", one) for one in behind))
         read = [self.pressure(node) for node in nodes[1:]]
         drives = (
             *(channel for node in nodes for channel in self.neighbours(node)),
             *(channel for channel in read if channel in self.has),
-            *(channel for one in own for channel in self.in_front(one)),
+            *(channel for one in itself for channel in self.in_front(one)),
             *(command for node in nodes for command in self.commands(node)),
-            *(dotted("supply_command", one) for one in (*own, *unread)),
+            *(dotted("supply_command", one) for one in (*itself, *without_gauge)),
         )
         drives = tuple(dict.fromkeys(drives))
         covers = "regulator" if table["kind"] == "regulator" else "supply"
@@ -448,19 +452,19 @@ class _Map:
             else (" and line" if table["kind"] != "regulator" else "")
         )
         covers += _called(name)
-        if not any(self.around(node) for node in nodes) or self._unread(
+        if not any(self.around(node) for node in nodes) or self._lacks_gauge(
             full, "constant", "regulator"
         ):
             return None
-        if any(not way.command for node in nodes[1:] for way in self.around(node)):
+        if any(not path.command for node in nodes[1:] for path in self.around(node)):
             # noise of two gauges at a line goes both ways, and is drawn one way
             why = "a regulator that it feeds has a line behind it, and no valve"
             return Unjudged(full, covers, why)
         if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
             return lacking
-        names = self.moved("supply", name, *(behind if unread else ()))
+        names = self.moved("supply", name, *(behind if without_gauge else ()))
         for node in nodes:
-            names |= self.of_ways(node) | self.zeros(self.nodes_at(node), ())
+            names |= self.of_paths(node) | self.zeros(self.nodes_at(node), ())
         return Block(
             full,
             self.pressure(full),
@@ -469,7 +473,7 @@ class _Map:
             frozenset(names),
             _GAS_STEP,
             covers,
-            ("supply",) if unread else (),
+            ("supply",) if without_gauge else (),
             tubes=self.tubes_at(full),
         )
 
@@ -478,8 +482,8 @@ class _Map:
         its pressure is then what is given.
         """
         full = qualified("chamber", name)
-        unread = self.unread(full)
-        fed = bool(self.neighbours(full) or self.commands(full) or unread)
+        without_gauge = self.without_gauge(full)
+        fed = bool(self.neighbours(full) or self.commands(full) or without_gauge)
         joints = tuple(
             dict.fromkeys(
                 self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name
@@ -490,7 +494,7 @@ class _Map:
             if fed
             else "chamber"
         )
-        covers = (f"regulator, {covers}" if unread else covers) + _called(name)
+        covers = (f"regulator, {covers}" if without_gauge else covers) + _called(name)
         if self.angles and not self.rig.tables("valve") and not self.rig.tables("supply"):
             return Unjudged(
                 full, covers, "nothing feeds it: its pressure is what drives the muscle"
@@ -498,16 +502,16 @@ class _Map:
         drives = (
             *self.neighbours(full),
             *self.commands(full),
-            *(dotted("supply_command", supply) for supply in unread),
-            *(channel for supply in unread for channel in self.in_front(supply)),
+            *(dotted("supply_command", supply) for supply in without_gauge),
+            *(channel for supply in without_gauge for channel in self.in_front(supply)),
             *(a for a in self.angles if block_of(a) in joints),
         )
         if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
             return lacking
         names = (
-            self.of_ways(full)
+            self.of_paths(full)
             | self.moved("chamber", name)
-            | self.moved("supply", *unread)
+            | self.moved("supply", *without_gauge)
             | self.zeros(self.nodes_at(full), joints or [""])
         )
         step = _GAS_STEP if fed else _SEALED_STEP
@@ -520,7 +524,7 @@ class _Map:
             frozenset(names),
             step,
             covers,
-            ("supply",) if unread else (),
+            ("supply",) if without_gauge else (),
             self.tubes_at(full),
             self.thermometers.get(name, ""),
             warm=self.warm(name),
@@ -563,18 +567,22 @@ class _Map:
         full = qualified("line", name)
         if self.pressure(full) not in self.has or not self.commands(full):
             return None
-        unread = self.unread(full)
+        without_gauge = self.without_gauge(full)
         drives = (
             *self.neighbours(full),
             *self.commands(full),
-            *(dotted("supply_command", supply) for supply in unread),
-            *(channel for supply in unread for channel in self.in_front(supply)),
+            *(dotted("supply_command", supply) for supply in without_gauge),
+            *(channel for supply in without_gauge for channel in self.in_front(supply)),
         )
-        covers = ("regulator and valve" if unread else "valve and line inlet") + _called(name)
+        covers = ("regulator and valve" if without_gauge else "valve and line inlet") + _called(
+            name
+        )
         if lacking := self.lacking(full, covers, (*drives, *self.angles)):
             return lacking
         names = (
-            self.of_ways(full) | self.moved("supply", *unread) | self.zeros(self.nodes_at(full), ())
+            self.of_paths(full)
+            | self.moved("supply", *without_gauge)
+            | self.zeros(self.nodes_at(full), ())
         )
         return Block(
             full,
@@ -584,7 +592,7 @@ class _Map:
             frozenset(names),
             _GAS_STEP,
             covers,
-            ("supply",) if unread else (),
+            ("supply",) if without_gauge else (),
             self.tubes_at(full),
         )
 
@@ -687,26 +695,26 @@ def unjudged_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Unjudged]:
 
 def _all_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block | Unjudged]:
     """Every block of a rig, judged or not."""
-    have = _Map(rig, channels)
+    have = _BlockMap(rig, channels)
     # what a small flow adds up to is seen from the valve on: two gauges at a tube hardly tell it
     closed = tuple(name for name in channels if channel_of(name) != "line_pressure")
-    whole = _Map(rig, closed)
+    whole = _BlockMap(rig, closed)
 
     def chamber(name: str) -> Block | Unjudged:
-        found = whole.chamber(name)
-        return found if isinstance(found, Block) else have.chamber(name)
+        block = whole.chamber(name)
+        return block if isinstance(block, Block) else have.chamber(name)
 
     chambers = [chamber(name) for name in rig.tables("chamber")]
-    found = [
+    blocks = [
         *(have.supply(name) for name in rig.tables("supply")),
         *(have.inlet(name) for name in rig.tables("line")),
         *chambers,
-        *(have.temperature(own) for own in chambers),
+        *(have.temperature(block) for block in chambers),
         *((have.arm(name) for name in rig.tables("joint")) if rig.tables("arm") else ()),
         *([have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else ()),
         *(have.pull(name) for name in pulls_of(rig)),
     ]
-    return [block for block in found if block is not None]
+    return [block for block in blocks if block is not None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -785,7 +793,9 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
     return base.freed(measured - prediction)
 
 
-def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tuple[Array, Array]]:
+def signals_at_starts(
+    block: Block, prepared: Prepared, starts: list[int]
+) -> dict[str, tuple[Array, Array]]:
     """Smoothed channels, with the best estimates, where windows start, of what a block integrates
     (an arm: all joints); inlets of lines only where the block is cut there.
     """
@@ -802,8 +812,8 @@ def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tupl
         if n == block.thermometer
         or (channel_of(n) in DRIVES and (channel_of(n) != "line_pressure" or n in around))
     }
-    own = {name: prepared.begun(name, starts) for name in state if name in drives}
-    return drives | own | _warm(block, prepared)
+    at_starts = {name: prepared.with_starts(name, starts) for name in state if name in drives}
+    return drives | at_starts | _warm(block, prepared)
 
 
 def _warm(block: Block, prepared: Prepared) -> dict[str, tuple[Array, Array]]:
@@ -814,16 +824,16 @@ def _warm(block: Block, prepared: Prepared) -> dict[str, tuple[Array, Array]]:
     return {block.warm.channel: (np.full(prepared.n, begins), np.zeros(prepared.n))}
 
 
-def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
+def _core_of_recording(core: _core.Rig, prepared: Prepared) -> _core.Rig:
     """A compiled rig with the values that it had in a recording."""
-    own = prepared.recording.parameters
-    if not own:
+    values = prepared.recording.parameters
+    if not values:
         return core
     known = dict(zip(core.parameter_names, core.values.tolist(), strict=True))
-    there = core.revalued({n: value.at(known[n]) for n, value in own.items() if n in known})
-    if there is None:
+    revalued = core.revalued({n: value.at(known[n]) for n, value in values.items() if n in known})
+    if revalued is None:
         raise AssertionError("values of a recording are those of parameters that can vary")
-    return there
+    return revalued
 
 
 def predicted(
@@ -831,7 +841,7 @@ def predicted(
     core: _core.Rig,
     prepared: Prepared,
     outlets: dict[str, float] | None = None,
-    before: Before | None = None,
+    before: TimeBefore | None = None,
 ) -> Array:
     """A block's output over a recording, every window from its measured start.
 
@@ -846,7 +856,7 @@ def predicted(
     outlets : dict of str to float, optional
         Where regulators without a gauge begin [Pa, gauge], by their full names; at the pressure of
         what they feed by default.
-    before : Before, optional
+    before : TimeBefore, optional
         What nobody measured begins as this leaves it, and not at rest.
 
     Returns
@@ -854,14 +864,14 @@ def predicted(
     (n,) array
         In the channel's unit.
     """
-    core = _there(core, prepared)
+    core = _core_of_recording(core, prepared)
     starts = prepared.starts(block.window, block.drives)
     commands = prepared.driving(mechanical=block.mechanical)
-    signals, lead = begun(block, prepared, starts), 0
+    signals, lead = signals_at_starts(block, prepared, starts), 0
     if before is not None:
         lead = before.samples
         commands = before.commands(commands, prepared.n)
-        measured = {name: own for name, own in signals.items() if name in prepared.signals}
+        measured = {name: signal for name, signal in signals.items() if name in prepared.signals}
         signals = before.signals(measured, prepared)
         # what is measured starts anew at every sample of it
         starts = [*range(lead), *(lead + start for start in starts)]
@@ -888,7 +898,7 @@ def _anchors(block: Block, prepared: Prepared, starts: list[int], lead: int = 0)
     return sorted(set(each) - set(starts))
 
 
-def _shown(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
+def _start_columns(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
     """Columns of what the start of a window can do, (n, k): of a pressure without the temperature
     at which its gas began once that is forgotten; of a temperature without where a thermometer
     stood that is not late.
@@ -901,8 +911,8 @@ def _shown(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
         return start
     noise, settings = prepared.noise[block.channel], prepared.settings
     with np.errstate(over="ignore"):  # of a model that ran away, which no fit keeps
-        told = float(np.linalg.norm(start[:, -1])) * settings.begun_temperature_error > noise
-    return start if told else start[:, :-1]
+        remembered = float(np.linalg.norm(start[:, -1])) * settings.begun_temperature_error > noise
+    return start if remembered else start[:, :-1]
 
 
 @dataclass(frozen=True)
@@ -931,9 +941,9 @@ class _GasStart:
             block.channel,
             *(n for n in block.drives if channel_of(n) == "supply_pressure"),
         ]
-        there = [prepared.signals[n][0] for n in pressures if n in prepared.signals]
-        first = float(there[0][0])
-        bounds = block.warm.range_at(first, max(float(v.max()) for v in there))
+        gauges = [prepared.signals[n][0] for n in pressures if n in prepared.signals]
+        first = float(gauges[0][0])
+        bounds = block.warm.range_at(first, max(float(v.max()) for v in gauges))
         wide = (bounds[1] - bounds[0]) / _START_DEVIATIONS
         least = prepared.settings.begun_temperature_error
         return cls(block.warm.room, *bounds, max(wide, least))
@@ -970,18 +980,24 @@ def _freed_window(
     if not (0.0 < length < math.inf and math.isfinite(float(value @ value))):
         return _FreedWindow(q, taken, begins)  # of a model that ran away
     way, held = column / length, (noise / gas.std) ** 2
-    there = float(way @ (value - taken))
-    seen = there + length * (begins - gas.room)  # in the residual, from the room's temperature
-    wanted = gas.room + length * seen / (length**2 + held)
-    found = min(max(wanted, gas.coldest), gas.warmest)
-    past = seen - length * (found - gas.room)
-    left = math.copysign(math.hypot(past, (found - gas.room) * noise / gas.std), seen)
+    along = float(way @ (value - taken))
+    from_room = along + length * (begins - gas.room)  # in the residual, from the room's temperature
+    wanted = gas.room + length * from_room / (length**2 + held)
+    temperature = min(max(wanted, gas.coldest), gas.warmest)
+    past = from_room - length * (temperature - gas.room)
+    kept_in_residual = math.copysign(
+        math.hypot(past, (temperature - gas.room) * noise / gas.std), from_room
+    )
     # how fast what is left grows with the residual
-    grows = past / left if left and found != wanted else held / (length**2 + held)
-    grows = grows if found != wanted else math.sqrt(held / (length**2 + held))
+    grows = (
+        past / kept_in_residual
+        if kept_in_residual and temperature != wanted
+        else held / (length**2 + held)
+    )
+    grows = grows if temperature != wanted else math.sqrt(held / (length**2 + held))
     basis = np.column_stack([q, math.sqrt(max(0.0, 1.0 - grows)) * way])
-    strain = ((found - gas.room) / gas.std) ** 2
-    return _FreedWindow(basis, taken + (there - left) * way, found, strain)
+    strain = ((temperature - gas.room) / gas.std) ** 2
+    return _FreedWindow(basis, taken + (along - kept_in_residual) * way, temperature, strain)
 
 
 def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array) -> list[Array]:
@@ -996,8 +1012,10 @@ def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array
         # how far it falls goes with the valve's area over the tank's volume, which nobody knows
         for off, steeper in ((np.ones_like(value), 0.0), (value - value[0], 1.0)):
             step = 1e-3 * max(1.0, float(np.abs(value).max())) / max(1.0, float(np.abs(off).max()))
-            there = prepared.shaken({name: (value + step * off, slope * (1.0 + step * steeper))})
-            bare = replace(there, recording=replace(there.recording, parameters={}))
+            moved = prepared.with_signals(
+                {name: (value + step * off, slope * (1.0 + step * steeper))}
+            )
+            bare = replace(moved, recording=replace(moved.recording, parameters={}))
             columns.append((predicted(block, core, bare) - prediction) / step)
     return columns
 
@@ -1006,17 +1024,17 @@ def _beside_starts(columns: list[Array], starts: list[tuple[int, int, Array]]) -
     """Orthonormal columns (n, k) that are free in a whole recording, without what the starts of its
     windows can do.
     """
-    kept, rounding = [], float(np.finfo(np.float64).eps) ** 0.5
+    free, rounding = [], float(np.finfo(np.float64).eps) ** 0.5
     for column in columns:
         whole = float(np.linalg.norm(column))
         for a, b, q in starts:
             column[a:b] -= q @ (q.T @ column[a:b])
-        left = float(np.linalg.norm(column))
-        if left > rounding * whole:
-            kept.append(column / left)
-    if not kept:
+        length = float(np.linalg.norm(column))
+        if length > rounding * whole:
+            free.append(column / length)
+    if not free:
         return np.zeros((0, 0))
-    basis, triangle = np.linalg.qr(np.array(kept).T)
+    basis, triangle = np.linalg.qr(np.array(free).T)
     return np.asarray(basis[:, np.abs(np.diag(triangle)) > rounding])
 
 
@@ -1038,7 +1056,7 @@ def _with_slopes(
         default_step(prepared.dt, longest=block.step),
         starts,
         names,
-        begun(block, prepared, starts),
+        signals_at_starts(block, prepared, starts),
         prepared.n,
         anchors=_anchors(block, prepared, starts),
         **({} if given is None else given._asdict()),
@@ -1063,17 +1081,17 @@ def _from_its_start(
     a prior say (Gauss-Newton), and the recording with that temperature.
     """
     gas = _GasStart.of(block, prepared)
-    found = _with_slopes(block, core, prepared, starts, names, given)
+    with_slopes = _with_slopes(block, core, prepared, starts, names, given)
     if gas is None:
-        return prepared, *found
+        return prepared, *with_slopes
     first = slice(starts[0], [*starts[1:], prepared.n][0])
     rows = prepared.usable(block.channel, block.drives, starts)[first]
     measured = np.where(rows, prepared.recording.channels[block.channel][first], 0.0)
     begins = gas.room
     for _ in range(_START_STEPS):
-        prediction, jacobian, _ = found
+        prediction, jacobian, _ = with_slopes
         start = np.where(rows[:, None], jacobian[first, len(names) :], 0.0)
-        columns = _shown(block, start, starts[0], prepared)
+        columns = _start_columns(block, start, starts[0], prepared)
         value = np.where(rows, measured - prediction[first], 0.0)
         if columns.shape[1] < 2 or not np.isfinite(value).all():
             break  # nothing of it is seen
@@ -1082,8 +1100,8 @@ def _from_its_start(
             break  # so far it is linear
         begins = wanted
         prepared = replace(prepared, temperatures={block.channel: begins})
-        found = _with_slopes(block, core, prepared, starts, names, given)
-    return prepared, *found
+        with_slopes = _with_slopes(block, core, prepared, starts, names, given)
+    return prepared, *with_slopes
 
 
 def residual(
@@ -1108,13 +1126,13 @@ def residual(
     given : Input, optional
         An input of the block beside what its model makes; the residual then has a `response`.
     """
-    core = _there(core, prepared)
+    core = _core_of_recording(core, prepared)
     starts = prepared.starts(block.window, block.drives)
     # without parameters a free null direction is still wanted for the window's start: ask for one
     # parameter
     given_own = [n for n, v in prepared.recording.parameters.items() if v.error == "own"]
-    own = [n for n in given_own if n in core.parameter_names]
-    names = list(dict.fromkeys([*parameters, *own])) or [
+    own_free = [n for n in given_own if n in core.parameter_names]
+    names = list(dict.fromkeys([*parameters, *own_free])) or [
         next(
             (n for n in core.parameter_names if n.endswith("pressure_zero")),
             core.parameter_names[0],
@@ -1123,33 +1141,33 @@ def residual(
     prepared, prediction, jacobian, response = _from_its_start(
         block, core, prepared, starts, names, given
     )
-    free = jacobian[:, [names.index(n) for n in own]].T.copy()
-    for name, there in prepared.recording.parameters.items():
+    free = jacobian[:, [names.index(n) for n in own_free]].T.copy()
+    for name, value_of in prepared.recording.parameters.items():
         if name in parameters:
-            jacobian[:, names.index(name)] *= there.slope
+            jacobian[:, names.index(name)] *= value_of.slope
     rows = prepared.usable(block.channel, block.drives, starts)
     measured = prepared.recording.channels[block.channel]
     value = np.where(rows, measured - prediction, 0.0)
     slopes = np.where(rows[:, None], np.hstack([jacobian[:, : len(names)], response]), 0.0)
     columns = np.where(rows[:, None], jacobian[:, len(names) :], 0.0)
-    left = Residual(value, None, prediction, rows, prepared.noise[block.channel])
-    found = _freed_of_starts(block, prepared, left, starts, columns, slopes)
+    not_freed = Residual(value, None, prediction, rows, prepared.noise[block.channel])
+    freed = _freed_of_starts(block, prepared, not_freed, starts, columns, slopes)
     every = [*_levels(block, core, prepared, prediction), *free]
-    of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], found.starts)
+    of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], freed.starts)
     if of_recording.size:
-        taken = of_recording @ (of_recording.T @ found.value)
+        taken = of_recording @ (of_recording.T @ freed.value)
         slopes -= of_recording @ (of_recording.T @ slopes)
-        found = replace(
-            found,
-            value=found.value - taken,
-            prediction=found.prediction + taken,
-            starts=[*found.starts, (0, prepared.n, of_recording)],
+        freed = replace(
+            freed,
+            value=freed.value - taken,
+            prediction=freed.prediction + taken,
+            starts=[*freed.starts, (0, prepared.n, of_recording)],
         )
     return replace(
-        found,
+        freed,
         jacobian=slopes[:, : len(parameters)] if parameters else None,
         # a whole recording is shown from its measured start, a window from the one that suits best
-        prediction=prediction if block.window is None else found.prediction,
+        prediction=prediction if block.window is None else freed.prediction,
         response=None if given is None else slopes[:, len(names) :],
     )
 
@@ -1157,7 +1175,7 @@ def residual(
 def _freed_of_starts(
     block: Block,
     prepared: Prepared,
-    left: Residual,
+    not_freed: Residual,
     starts: list[int],
     columns: Array,
     slopes: Array,
@@ -1165,22 +1183,24 @@ def _freed_of_starts(
     """A residual freed of where its windows start, and so are `slopes` (n, k), in place; windows
     with too few rows are left out. ``columns`` are what the start of each window does.
     """
-    value, rows, shifted = left.value, left.rows, left.prediction.copy()
+    value, rows, shifted = not_freed.value, not_freed.rows, not_freed.prediction.copy()
     gas = _GasStart.of(block, prepared)
     begins = prepared.temperatures.get(block.channel, gas.room) if gas else 0.0
     temperature, strain = (begins if gas else None), 0.0
     bases: list[tuple[int, int, Array]] = []
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
-        start = _shown(block, columns[a:b], a, prepared)
+        start = _start_columns(block, columns[a:b], a, prepared)
         if np.count_nonzero(rows[a:b]) < WINDOW_SAMPLES_PER_STATE * start.shape[1]:
             rows[a:b], value[a:b], slopes[a:b] = False, 0.0, 0.0
             continue
-        own = gas if a == starts[0] and start.shape[1] > 1 else None
-        freed = _freed_window(start, value[a:b], left.noise, own, begins)
+        first_gas = gas if a == starts[0] and start.shape[1] > 1 else None
+        freed = _freed_window(start, value[a:b], not_freed.noise, first_gas, begins)
         bases.append((a, b, freed.basis))
         value[a:b] -= freed.taken
         shifted[a:b] += freed.taken
         slopes[a:b] -= freed.basis @ (freed.basis.T @ slopes[a:b])
         strain += freed.strain
         temperature = freed.begins or temperature
-    return replace(left, prediction=shifted, starts=bases, temperature=temperature, strain=strain)
+    return replace(
+        not_freed, prediction=shifted, starts=bases, temperature=temperature, strain=strain
+    )

@@ -96,19 +96,19 @@ class Alignment:
         return self.rate * time + self.lag
 
 
-class Told(NamedTuple):
+class SharedRows(NamedTuple):
     """Rows of the slower of two recordings at an alignment: those that lie in the other one, those
     in which some channel's deviations are the same, and those in which all channels that show
     anything differ.
     """
 
-    way: Alignment
+    alignment: Alignment
     inside: Mask
     same: Mask
     other: Mask
 
 
-class _Channel(NamedTuple):
+class _Deviations(NamedTuple):
     """A channel: its values, where they are known, their deviations by their standard deviation
     (zero where nothing is known), and the step of the converter where the noise is far smaller.
     """
@@ -118,27 +118,29 @@ class _Channel(NamedTuple):
     deviations: Array
     step: float
 
-    def at(self, rows: Index) -> _Channel:
+    def at(self, rows: Index) -> _Deviations:
         """Channel at some rows."""
-        return _Channel(self.values[rows], self.known[rows], self.deviations[rows], self.step)
+        return _Deviations(self.values[rows], self.known[rows], self.deviations[rows], self.step)
 
 
-class Channels:
+class ChannelDeviations:
     """Channels of recordings with their deviations, each found once."""
 
     def __init__(self) -> None:
-        self._found: dict[tuple[Recording, str], _Channel] = {}
+        self._by_name: dict[tuple[Recording, str], _Deviations] = {}
 
-    def of(self, recording: Recording, names: Sequence[str]) -> dict[str, _Channel]:
+    def of(self, recording: Recording, names: Sequence[str]) -> dict[str, _Deviations]:
         """Channels of a recording, by name."""
         for name in names:
-            if (recording, name) not in self._found:
+            if (recording, name) not in self._by_name:
                 values, known = recording.channels[name], recording.mask[name]
-                self._found[recording, name] = _channel(values, known)
-        return {name: self._found[recording, name] for name in names}
+                self._by_name[recording, name] = _channel(values, known)
+        return {name: self._by_name[recording, name] for name in names}
 
 
-def told(slow: Recording, fast: Recording, names: list[str], channels: Channels) -> Iterator[Told]:
+def shared_rows(
+    slow: Recording, fast: Recording, names: list[str], channels: ChannelDeviations
+) -> Iterator[SharedRows]:
     """Every alignment at which deviations of some channel are the same.
 
     Of two recordings of a million samples each it takes some seconds, most of them for correlations
@@ -150,67 +152,67 @@ def told(slow: Recording, fast: Recording, names: list[str], channels: Channels)
         By sample time.
     names : list of str
         Channels that both have measured.
-    channels : Channels
+    channels : ChannelDeviations
         What was found of recordings before.
 
     Yields
     ------
-    Told
+    SharedRows
     """
-    own, there = channels.of(slow, names), channels.of(fast, names)
+    slow_channels, fast_channels = channels.of(slow, names), channels.of(fast, names)
     ratio = slow.sample_time / fast.sample_time
     some = False
-    for rate, start in _clocks(slow, fast, own, there):
+    for rate, start in _clocks(slow, fast, slow_channels, fast_channels):
         if some and rate not in (1.0, -1.0):
             return
         phases = min(_PHASES, max(1, round(abs(rate) * ratio)))
         for mean in (False, True) if abs(rate) * ratio > 1.5 else (False,):
             for phase in range(phases):
-                way = Alignment(rate, start + phase * fast.sample_time, mean)
-                for one in _at(slow, fast, (own, there), way):
+                at = Alignment(rate, start + phase * fast.sample_time, mean)
+                for alignment in _alignments_at(slow, fast, (slow_channels, fast_channels), at):
                     some = True
-                    yield one
+                    yield alignment
     if not some:
-        yield from _between(slow, fast, own, there)
+        yield from _between(slow, fast, slow_channels, fast_channels)
 
 
 # ------------------------------------------------------------------ channels
 
 
-def _channel(values: Array, known: Mask) -> _Channel:
+def _channel(values: Array, known: Mask) -> _Deviations:
     """Channel with the deviation of each sample from what its neighbours predict."""
     index = np.arange(values.size)
     nothing = np.zeros(values.size)
     if known.sum() < 4 * _BESIDE_SAMPLES or not np.ptp(values[known]) > 0.0:
-        return _Channel(nothing, known, nothing, 0.0)
+        return _Deviations(nothing, known, nothing, 0.0)
     filled = values if known.all() else np.interp(index, index[known], values[known])
-    centred, own = filled - filled.mean(), np.r_[-_BESIDE_SAMPLES:0, 1 : _BESIDE_SAMPLES + 1]
+    centred, offsets = filled - filled.mean(), np.r_[-_BESIDE_SAMPLES:0, 1 : _BESIDE_SAMPLES + 1]
     inner = known & (index >= _BESIDE_SAMPLES) & (index < values.size - _BESIDE_SAMPLES)
     flat = np.diff(centred) == 0.0
     moves = inner & ~(np.r_[False, flat] & np.r_[flat, False])
     counted = (
         moves if moves.sum() > 4 * _BESIDE_SAMPLES else inner
     )  # a rest says nothing of the noise
-    use, left, weights = counted, centred, np.zeros(own.size)
+    use, deviations, weights = counted, centred, np.zeros(offsets.size)
     for _ in range(4):  # steps of the signal do not say how noise is told
-        if use.sum() < 2 * own.size:
+        if use.sum() < 2 * offsets.size:
             break
-        weights, follows = _followed(centred, own, centred, use)
-        left = centred - follows
-        size = 1.25 * float(np.mean(np.abs(left[use])))
-        use = counted & (np.abs(left) <= _STEP_NOISES * size)
-    size = float(np.sqrt(np.mean(left[use] ** 2))) if use.any() else 0.0
+        weights, follows = _prediction_by(centred, offsets, centred, use)
+        deviations = centred - follows
+        size = 1.25 * float(np.mean(np.abs(deviations[use])))
+        use = counted & (np.abs(deviations) <= _STEP_NOISES * size)
+    size = float(np.sqrt(np.mean(deviations[use] ** 2))) if use.any() else 0.0
     step = _step(filled[known])
     noise = size / float(np.sqrt(1.0 + weights @ weights))
     coarse = step if step > _COARSE_STEP * noise else 0.0
     if not size > 1e-12 * float(np.abs(centred).max()):
-        return _Channel(filled, known, nothing, coarse)
+        return _Deviations(filled, known, nothing, coarse)
     # a step of the signal is left in all samples beside it
     steps = uniform_filter1d((counted & ~use).astype(float), 4 * _BESIDE_SAMPLES + 1) > 1e-6
-    return _Channel(filled, known, np.where(inner & ~steps, left / size, 0.0), coarse)
+    return _Deviations(filled, known, np.where(inner & ~steps, deviations / size, 0.0), coarse)
 
 
-def _followed(source: Array, offsets: Index, wanted: Array, use: Mask) -> tuple[Array, Array]:
+def _prediction_by(source: Array, offsets: Index, wanted: Array, use: Mask) -> tuple[Array, Array]:
     """Weights with which a source's samples at some offsets predict the wanted ones best in some
     rows, and that prediction of all samples.
     """
@@ -236,16 +238,18 @@ def _step(values: Array) -> float:
     return step if np.mean(np.abs(off - np.round(off)) < 0.02) > 0.99 else 0.0
 
 
-def _moved(fast: Recording, name: str, one: _Channel, at: Array, width: float) -> _Channel:
+def _channel_at(
+    fast: Recording, name: str, one: _Deviations, at: Array, width: float
+) -> _Deviations:
     """A channel at times [s], which may be its own, from either end."""
     for way in (1, -1):
         apart = at - fast.time[::way] if at.size == len(fast) else np.inf
         if np.max(np.abs(apart)) < 1e-6 * fast.sample_time:  # but for rounding
             return one.at(np.arange(len(fast))[::way])
-    return _seen(fast, name, at, width)._replace(step=one.step)
+    return _interpolated(fast, name, at, width)._replace(step=one.step)
 
 
-def _seen(fast: Recording, name: str, at: Array, width: float) -> _Channel:
+def _interpolated(fast: Recording, name: str, at: Array, width: float) -> _Deviations:
     """A channel at times [s]; means over a width [s] above its sample time. What lies between two
     samples or is a mean is on no step of a converter, and has its pattern all the same.
     """
@@ -269,8 +273,8 @@ def _seen(fast: Recording, name: str, at: Array, width: float) -> _Channel:
 def _clocks(
     slow: Recording,
     fast: Recording,
-    own: dict[str, _Channel],
-    there: dict[str, _Channel],
+    slow_channels: dict[str, _Deviations],
+    fast_channels: dict[str, _Deviations],
 ) -> Iterator[tuple[float, float]]:
     """Rates of the slower recording's clock in the other one, and times from which they run [1, s]:
     as both say; backwards; sample by sample; as blocks of it are found there.
@@ -280,16 +284,16 @@ def _clocks(
     ratio = fast.sample_time / slow.sample_time
     if 1.0 - _CLOCK < ratio < 1.0:
         yield ratio, 0.0
-    found = _rate(slow, fast, own, there)
-    if found is not None:
-        yield found, 0.0
+    rate = _rate(slow, fast, slow_channels, fast_channels)
+    if rate is not None:
+        yield rate, 0.0
 
 
 def _rate(
     slow: Recording,
     fast: Recording,
-    own: dict[str, _Channel],
-    there: dict[str, _Channel],
+    slow_channels: dict[str, _Deviations],
+    fast_channels: dict[str, _Deviations],
 ) -> float | None:
     """The rate at which the deviations of blocks are found in the other recording; None where they
     are not.
@@ -297,13 +301,13 @@ def _rate(
     ratio = fast.sample_time / slow.sample_time
     if len(slow) < 2 * _BLOCK_SAMPLES or ratio < 0.5:
         return None
-    seen = min(len(slow), _MOST_SEARCHED)
-    starts = np.linspace(0, seen - _BLOCK_SAMPLES, _RATE_BLOCKS).astype(int)
+    searched = min(len(slow), _MOST_SEARCHED)
+    starts = np.linspace(0, searched - _BLOCK_SAMPLES, _RATE_BLOCKS).astype(int)
     step = 0.5 / _BLOCK_SAMPLES
     rates = 1.0 + step * np.arange(2, int(_CLOCK / step) + 1)
-    best, found = _LEAST_PEAK, None
-    for name, channel in own.items():
-        other = there[name].deviations[: 2 * _MOST_SEARCHED]
+    best, rate_found = _LEAST_PEAK, None
+    for name, channel in slow_channels.items():
+        other = fast_channels[name].deviations[: 2 * _MOST_SEARCHED]
         length = next_fast_len(other.size + 2 * _BLOCK_SAMPLES, real=True)
         spectrum = rfft(_single(other), length)
         for rate in (*rates, *(2.0 - rates)):
@@ -319,29 +323,29 @@ def _rate(
             line = np.polyfit(starts * slow.sample_time, places, 1)
             off = np.abs(np.polyval(line, starts * slow.sample_time) - places)
             if min(peaks) > best and off.max() < 4.0:
-                best, found = min(peaks), float(line[0]) * fast.sample_time
-    return found
+                best, rate_found = min(peaks), float(line[0]) * fast.sample_time
+    return rate_found
 
 
-def _at(
+def _alignments_at(
     slow: Recording,
     fast: Recording,
-    channels: tuple[dict[str, _Channel], dict[str, _Channel]],
-    way: Alignment,
-) -> Iterator[Told]:
+    channels: tuple[dict[str, _Deviations], dict[str, _Deviations]],
+    alignment: Alignment,
+) -> Iterator[SharedRows]:
     """Alignments of one rate at which some channel's deviations are those of the other one."""
-    own, there = channels
-    step = way.rate * slow.sample_time
+    slow_channels, fast_channels = channels
+    step = alignment.rate * slow.sample_time
     count = int(fast.duration / abs(step) + 1.5)
-    at: Array = way.lag + step * np.arange(count, dtype=np.float64)
-    width = abs(step) if way.mean else 0.0
-    other = {name: _moved(fast, name, one, at, width) for name, one in there.items()}
+    at: Array = alignment.lag + step * np.arange(count, dtype=np.float64)
+    width = abs(step) if alignment.mean else 0.0
+    other = {name: _channel_at(fast, name, one, at, width) for name, one in fast_channels.items()}
     between = abs(step) / fast.sample_time
     whole = abs(between - round(between)) < 1e-6  # what lies between samples is on no step
-    lags = {name: _lags(channel, other[name]) for name, channel in own.items()}
-    for lag in dict.fromkeys(lag for found in lags.values() for lag in found):
+    lags = {name: _lags(channel, other[name]) for name, channel in slow_channels.items()}
+    for lag in dict.fromkeys(lag for by_lag in lags.values() for lag in by_lag):
         rows = np.arange(max(0, -lag), min(len(slow), count - lag))
-        pairs = {n: (one.at(rows), other[n].at(rows + lag)) for n, one in own.items()}
+        pairs = {n: (one.at(rows), other[n].at(rows + lag)) for n, one in slow_channels.items()}
         copied = {n: lags[n].get(lag, 0.0) for n in pairs}
         flips = {n for n, pair in pairs.items() if whole and _same_flips(*pair)}
         if not (flips or any(copied.values())):
@@ -356,8 +360,8 @@ def _at(
                 same[rows] |= a.known & b.known
             others[rows] |= unlike
         if same.sum() >= LEAST_SAMPLES:
-            here = Alignment(way.rate, way.lag + lag * step, way.mean)
-            yield Told(here, inside, same, others & ~same)
+            here = Alignment(alignment.rate, alignment.lag + lag * step, alignment.mean)
+            yield SharedRows(here, inside, same, others & ~same)
 
 
 def _single(values: Array) -> NDArray[np.float32]:
@@ -365,12 +369,12 @@ def _single(values: Array) -> NDArray[np.float32]:
     return values.astype(np.float32)
 
 
-def _lags(a: _Channel, b: _Channel) -> dict[int, float]:
+def _lags(a: _Deviations, b: _Deviations) -> dict[int, float]:
     """Rows by which one channel may run behind in the other one, and the correlation of their
     deviations where these go together there and nowhere else, 0 elsewhere: a command that is
     repeated has its periods too.
     """
-    found: dict[int, float] = {}
+    shares: dict[int, float] = {}
     pairs = [(a.deviations, b.deviations, 1)]
     if a.step or b.step:  # flips of a converter tell more than what neighbours leave of them
         pairs.append((np.sign(np.diff(a.values)), np.sign(np.diff(b.values)), _LAGS))
@@ -391,13 +395,13 @@ def _lags(a: _Channel, b: _Channel) -> dict[int, float]:
             peaks[beside % length] = 0.0
             alone = peak > max(_LEAST_PEAK, _PEAK_RATIO * float(peaks.max()))
             lag = place if place < other.size else place - length
-            told = most == 1 and alone and not (a.step and b.step)
-            share = peak / float(np.sqrt(max(power[place], 1.0))) if told else 0.0
-            found[lag] = max(found.get(lag, 0.0), share)
-    return found
+            noise_alone = most == 1 and alone and not (a.step and b.step)
+            share = peak / float(np.sqrt(max(power[place], 1.0))) if noise_alone else 0.0
+            shares[lag] = max(shares.get(lag, 0.0), share)
+    return shares
 
 
-def _by_window(a: _Channel, b: _Channel) -> tuple[Mask, Mask, bool]:
+def _by_window(a: _Deviations, b: _Deviations) -> tuple[Mask, Mask, bool]:
     """Rows about which the deviations of one channel follow those of the other one, rows about
     which they do not, and whether the two differ so clearly that windows can be told apart.
     """
@@ -407,8 +411,8 @@ def _by_window(a: _Channel, b: _Channel) -> tuple[Mask, Mask, bool]:
         nothing = np.zeros(wanted.size, dtype=bool)
         return nothing, nothing, False
     use = wanted != 0.0
-    _, follows = _followed(b.deviations, offsets, wanted, use)
-    product, own, other, alive = (
+    _, follows = _prediction_by(b.deviations, offsets, wanted, use)
+    product, own_power, other, alive = (
         uniform_filter1d(part, WINDOW_SAMPLES, mode="nearest")
         for part in (
             wanted * follows,
@@ -417,7 +421,7 @@ def _by_window(a: _Channel, b: _Channel) -> tuple[Mask, Mask, bool]:
             (use & (b.deviations != 0.0)).astype(float),
         )
     )
-    share = product / np.sqrt(np.maximum(own * other, _TINY))
+    share = product / np.sqrt(np.maximum(own_power * other, _TINY))
     says = alive > _LEAST_ALIVE
     chance = _CHANCE_SHARE / np.sqrt(np.maximum(alive * WINDOW_SAMPLES, 1.0))
     alike = says & (share > np.maximum(_FOLLOW_SHARE, chance))
@@ -425,7 +429,7 @@ def _by_window(a: _Channel, b: _Channel) -> tuple[Mask, Mask, bool]:
     return alike, says & (share <= _FOLLOW_SHARE), clear
 
 
-def _same_flips(a: _Channel, b: _Channel) -> bool:
+def _same_flips(a: _Deviations, b: _Deviations) -> bool:
     """True where two channels on the steps of a converter flip in the same samples; noise of their
     own would let them flip in others.
     """
@@ -460,9 +464,9 @@ def _flips(levels: Array) -> int:
 def _between(
     slow: Recording,
     fast: Recording,
-    own: dict[str, _Channel],
-    other: dict[str, _Channel],
-) -> Iterator[Told]:
+    slow_channels: dict[str, _Deviations],
+    other: dict[str, _Deviations],
+) -> Iterator[SharedRows]:
     """Samples of one run that were dealt out to two recordings: those of one lie at a whole
     fraction between those of the other one and differ by noise alone, and no command that is
     repeated made both.
@@ -470,13 +474,13 @@ def _between(
     dt = slow.sample_time
     if abs(dt - fast.sample_time) > 1e-3 * dt or _repeats(slow, fast):
         return
-    for name, channel in own.items():
+    for name, channel in slow_channels.items():
         lag = _fraction(channel, other[name], dt)
         if lag is None:
             continue
         inside = (slow.time + lag >= 0.0) & (slow.time + lag <= fast.duration)
         if inside.sum() >= LEAST_SAMPLES:
-            yield Told(Alignment(1.0, lag), inside, inside, np.zeros(inside.size, dtype=bool))
+            yield SharedRows(Alignment(1.0, lag), inside, inside, np.zeros(inside.size, dtype=bool))
             return
 
 
@@ -492,7 +496,7 @@ def _repeats(slow: Recording, fast: Recording) -> bool:
     return False
 
 
-def _fraction(a: _Channel, b: _Channel, dt: float) -> float | None:
+def _fraction(a: _Deviations, b: _Deviations, dt: float) -> float | None:
     """Time [s] between the samples of two channels where it is a whole fraction of the sample time
     and nothing but noise is left between the two; None elsewhere.
     """
@@ -504,21 +508,21 @@ def _fraction(a: _Channel, b: _Channel, dt: float) -> float | None:
     inner = (index > 2.0) & (index < size - 3.0) & a.known[:size] & b.known[:size]
     if inner.sum() < LEAST_SAMPLES:
         return None
-    slope, lag, left = np.gradient(smooth), 0.0, np.zeros(size)
+    slope, lag, rest = np.gradient(smooth), 0.0, np.zeros(size)
     for _ in range(8):
-        left = a.values[:size] - curve(np.clip(index + lag, 0.0, size - 1.0))
+        rest = a.values[:size] - curve(np.clip(index + lag, 0.0, size - 1.0))
         power = float(np.sum(slope[inner] ** 2))
-        lag += float(np.sum((slope * left)[inner])) / max(power, _TINY)
+        lag += float(np.sum((slope * rest)[inner])) / max(power, _TINY)
         if not abs(lag) < 2.0:
             return None
-    noise = float(np.std(left[inner]))
+    noise = float(np.std(rest[inner]))
     unsure = noise / np.sqrt(max(power, _TINY))
     whole = min((round(lag * n) / n for n in (2, 3)), key=lambda part: abs(part - lag))
     off = abs(whole - lag) > max(3.0 * unsure, _BETWEEN_ERROR)
     if off or unsure > _BETWEEN_ERROR or abs(whole - round(whole)) < 1e-9:
         return None
-    blocks = left[inner][: inner.sum() // WINDOW_SAMPLES * WINDOW_SAMPLES]
+    blocks = rest[inner][: inner.sum() // WINDOW_SAMPLES * WINDOW_SAMPLES]
     means = blocks.reshape(-1, WINDOW_SAMPLES).mean(axis=1)
-    rough = np.diff(left[inner]).std() / np.sqrt(2.0)
+    rough = np.diff(rest[inner]).std() / np.sqrt(2.0)
     chance = rough / np.sqrt(WINDOW_SAMPLES)
     return whole * dt if np.sqrt(np.mean(means**2)) < _BETWEEN_LEFT * chance else None

@@ -36,7 +36,7 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
     Returns
     -------
     recordings : list of Recording
-    said : list of Faulty
+    faults : list of Faulty
         Each channel with such an end.
     """
     ends: dict[str, set[float]] = {}
@@ -44,23 +44,25 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
         for issue in recording.issues:
             if issue.rail is not None:
                 ends.setdefault(issue.channel, set()).add(issue.rail)
-    found, said = list(recordings), list[Faulty]()
+    masked, faults = list(recordings), list[Faulty]()
     for channel, rails in ends.items():
         for rail in sorted(rails):
             counts: dict[str, int] = {}
-            own = [r.channels[channel][r.mask[channel]] for r in found if channel in r.channels]
-            seen = np.concatenate(own)
-            if seen.min() < rail < seen.max():
+            samples = [
+                r.channels[channel][r.mask[channel]] for r in masked if channel in r.channels
+            ]
+            every = np.concatenate(samples)
+            if every.min() < rail < every.max():
                 continue  # it stayed there, and reads more elsewhere
-            for k, recording in enumerate(found):
+            for k, recording in enumerate(masked):
                 if channel not in recording.channels:
                     continue
                 bad = _beyond(recording, channel, rail, _RAIL_SAMPLES)
                 if bad.any():
                     counts[recording.name] = int(bad.sum())
-                    found[k] = _masked(recording, channel, bad)
-            said.append(Faulty(channel, "clipped", _sentence(found, channel, rail, counts)))
-    return found, said
+                    masked[k] = _masked(recording, channel, bad)
+            faults.append(Faulty(channel, "clipped", _sentence(masked, channel, rail, counts)))
+    return masked, faults
 
 
 def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> Mask:
@@ -73,13 +75,13 @@ def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> Mas
         return np.zeros_like(mask)
     upper = rail >= float(np.median(inside))
     slack = 1e-9 * max(1.0, abs(rail))
-    there = mask & (values >= rail - slack if upper else values <= rail + slack)
+    at_end = mask & (values >= rail - slack if upper else values <= rail + slack)
     for issue in recording.issues:
         if issue.channel == channel and issue.rail == rail:
             # what is reported of several stretches together lies anywhere between its ends
             between = (recording.time >= issue.start) & (recording.time <= issue.stop)
-            there |= between & ~mask
-    bad: Mask = binary_dilation(there, iterations=beside) if there.any() else there
+            at_end |= between & ~mask
+    bad: Mask = binary_dilation(at_end, iterations=beside) if at_end.any() else at_end
     return bad
 
 
@@ -105,10 +107,10 @@ def _sentence(
         value = f"{rail:.6g} {next(r.units.get(channel, 'SI') for r in recordings)}"
     counted = [f"{count} in {name}" for name, count in counts.items()]
     more = len(counted) - _MOST_COUNTED
-    told = ", ".join(counted[:_MOST_COUNTED]) + f" and more in {more} others" * (more > 0)
+    examples = ", ".join(counted[:_MOST_COUNTED]) + f" and more in {more} others" * (more > 0)
     return (
         f"{channel} is clipped: its sensor's range ends at {value}; samples there, and "
-        f"their neighbours, were masked in all recordings ({told})"
+        f"their neighbours, were masked in all recordings ({examples})"
     )
 
 
@@ -136,7 +138,7 @@ def without_poor_thermometers(
     rig : Rig
         The model.
     """
-    said = []
+    notes = []
     for name in thermometers_of(rig).values():
         faults = [
             f"in {r.name!r} {fault}"
@@ -144,7 +146,7 @@ def without_poor_thermometers(
             if name in r.channels and (fault := _fault(r, name))
         ]
         if faults:
-            said.append(f"{name} is not judged: {'; '.join(faults)}")
+            notes.append(f"{name} is not judged: {'; '.join(faults)}")
             recordings = [
                 replace(
                     r,
@@ -153,7 +155,7 @@ def without_poor_thermometers(
                 )
                 for r in recordings
             ]
-    return list(recordings), said
+    return list(recordings), notes
 
 
 def _fault(recording: Recording, name: str) -> str:

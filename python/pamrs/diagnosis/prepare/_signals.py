@@ -48,7 +48,7 @@ _ROUNDED_STILL = 0.03
 # noise in converter steps below which rounding is not white; at half a step it nearly is
 _ROUNDED_SHARE = 0.5
 # fewest samples of a recording: noise takes eleven, a leak of a shut chamber shows in sixteen
-_LEAST_SAMPLES = 12
+_RECORDING_LEAST_SAMPLES = 12
 _LEAST_CHANNEL_SAMPLES = 11  # fewest usable samples of a channel
 _LEAST_CHANNEL_SHARE = 0.2  # share of a channel's samples that must be usable
 
@@ -60,7 +60,7 @@ _TERMS = 4
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels at which a rig is cut; of a block with a name its name stands behind it."""
-COMMANDS = with_trait("driven")
+DRIVEN_COMMANDS = with_trait("driven")
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +117,11 @@ class Prepared:
     settings: DiagnosisSettings
     steps: dict[str, float] = field(default_factory=dict)
     unsettled: dict[str, int] = field(default_factory=dict)
-    unheard: dict[str, Mask] = field(default_factory=dict)
+    after_holes: dict[str, Mask] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
     simulated: tuple[str, ...] = ()
     at_rest: frozenset[str] = frozenset()
-    _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
+    _start_states: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
         repr=False, default_factory=dict
     )
     _clear: dict[tuple[str, ...], Mask] = field(repr=False, default_factory=dict)
@@ -171,7 +171,7 @@ class Prepared:
         starts |= set((np.flatnonzero(good[1:] & ~good[:-1]) + 1).tolist())
         return sorted(starts)
 
-    def begun(self, channel: str, starts: list[int]) -> tuple[Array, Array]:
+    def with_starts(self, channel: str, starts: list[int]) -> tuple[Array, Array]:
         """Smoothed channel and its derivative, with the best estimates of both where windows start.
 
         At the edge of a recording the filter's derivative is ten times as noisy as inside, and a
@@ -180,7 +180,7 @@ class Prepared:
         one cubic all of it.
         """
         key = (channel, tuple(starts))
-        if key not in self._begun:
+        if key not in self._start_states:
             value, slope = (array.copy() for array in self.signals[channel])
             for at in starts if self.lengths[channel].any() else []:
                 state = _state(
@@ -195,13 +195,15 @@ class Prepared:
                     state = float(np.median(self.raw[channel][rows])), 0.0
                 if state is not None:
                     value[at], slope[at] = state
-            self._begun[key] = value, slope
-        return self._begun[key]
+            self._start_states[key] = value, slope
+        return self._start_states[key]
 
     def bridged(self) -> Prepared:
         """Recording without holes, for simulations through them: no window begins there."""
         whole = {name: np.ones_like(own) for name, own in self.recording.mask.items()}
-        return replace(self, recording=replace(self.recording, mask=whole), _begun={}, _clear={})
+        return replace(
+            self, recording=replace(self.recording, mask=whole), _start_states={}, _clear={}
+        )
 
     def commanded_early(self) -> Prepared | None:
         """Recording whose commands change where a hole in them begins, not where it ends; None
@@ -216,14 +218,16 @@ class Prepared:
                 known = np.repeat(mask, each)
                 commands[name] = np.ascontiguousarray(early)
                 logged[name] = np.where(known, logged[name], np.repeat(early, each))
-        if all(commands[name] is own for name, own in self.commands.items()):
+        if all(commands[name] is values for name, values in self.commands.items()):
             return None
         return replace(self, commands=commands, held=logged)
 
-    def shaken(self, shaken: dict[str, tuple[Array, Array]]) -> Prepared:
+    def with_signals(self, shaken: dict[str, tuple[Array, Array]]) -> Prepared:
         """Recording with other smoothed channels; the starts of all others are kept."""
-        kept = {key: state for key, state in dict(self._begun).items() if key[0] not in shaken}
-        return replace(self, signals=self.signals | shaken, _begun=kept)
+        kept = {
+            key: state for key, state in dict(self._start_states).items() if key[0] not in shaken
+        }
+        return replace(self, signals=self.signals | shaken, _start_states=kept)
 
     def usable(self, output: str, drives: tuple[str, ...], starts: list[int]) -> Mask:
         """Rows whose prediction rests on measured drives since their window began, and whose output
@@ -235,8 +239,8 @@ class Prepared:
             first = np.flatnonzero(bad[a:b])
             rows[a : a + (int(first[0]) if first.size else b - a)] = True
         rows[: self.unsettled.get(output, 0)] = False
-        if output in self.unheard:
-            rows &= ~self.unheard[output]
+        if output in self.after_holes:
+            rows &= ~self.after_holes[output]
         return rows & self.recording.mask[output]
 
 
@@ -348,15 +352,15 @@ def lengths_of(values: Array, noise: float, dt: float, settings: DiagnosisSettin
     shortest, length = filter_length(math.inf, settings), filter_length(dt, settings)
     if _is_one_cubic(values, noise, length):
         return np.zeros(values.size, dtype=np.intp)
-    found = np.ones(values.size, dtype=np.intp)
+    lengths = np.ones(values.size, dtype=np.intp)
     for count in sorted({shortest, max(shortest, round(0.5 * length) | 1), length}):
         basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), 4))[0]
         frames = np.lib.stride_tricks.sliding_window_view(values - values.mean(), count)
         missed = np.sum((frames - (frames @ basis) @ basis.T) ** 2, axis=1) / (count - 4)
         usual = max(noise**2, float(np.median(missed)))
         fits = missed <= usual * chi2.isf(_SMOOTHING_ODDS, count - 4) / (count - 4)
-        found[np.pad(fits, count // 2, mode="edge")] = count
-    return found
+        lengths[np.pad(fits, count // 2, mode="edge")] = count
+    return lengths
 
 
 def _is_one_cubic(values: Array, noise: float, length: int) -> bool:
@@ -454,17 +458,17 @@ def _state(
             continue
         powers = np.vander((rows - at) / count, 4, increasing=True)
         inverse = np.linalg.inv(powers.T @ powers)
-        found = inverse @ (powers.T @ values[rows])
-        left = values[rows] - powers @ found
-        slope = float(found[1]) / (count * dt)
+        cubic = inverse @ (powers.T @ values[rows])
+        rest = values[rows] - powers @ cubic
+        slope = float(cubic[1]) / (count * dt)
         scatters = _START_LONGER_STDS if state is not None else _START_FIRST_STDS
         most = _START_MISFIT + scatters * math.sqrt(2.0 / (count - 4))
-        rough = float(left @ left) > most * (count - 4) * noise**2
+        rough = float(rest @ rest) > most * (count - 4) * noise**2
         if state is not None and (rough or abs(slope - state[1]) > _START_SLOPE_STDS * spread):
             break
         if not rough:
             state, spread = (
-                (float(found[0]), slope),
+                (float(cubic[0]), slope),
                 noise * math.sqrt(inverse[1, 1]) / (count * dt),
             )
     return state
@@ -474,11 +478,11 @@ def _bridged(values: Array, mask: Mask) -> Array:
     """A channel with its holes bridged by cubics that turn nowhere between samples (Fritsch &
     Butland 1984), and before the first sample and after the last one as it is there.
     """
-    there, missing = np.flatnonzero(mask), np.flatnonzero(~mask)
+    known, missing = np.flatnonzero(mask), np.flatnonzero(~mask)
     bridged = values.copy()
     if missing.size:
-        between = PchipInterpolator(there, values[there])
-        bridged[missing] = between(np.clip(missing, there[0], there[-1]))
+        between = PchipInterpolator(known, values[known])
+        bridged[missing] = between(np.clip(missing, known[0], known[-1]))
     return bridged
 
 
@@ -559,7 +563,7 @@ def unusable(recording: Recording, rig: Rig, core: _core.Rig, settings: Diagnosi
             f"it has no channel {' or '.join(wanted)}, without which no block can be cut out; it "
             f"has: {', '.join(recording.channels)}"
         )
-    length = max(_LEAST_SAMPLES, filter_length(recording.sample_time, settings))
+    length = max(_RECORDING_LEAST_SAMPLES, filter_length(recording.sample_time, settings))
     if len(recording) < length:
         return f"it has {len(recording)} samples; at least {length} are needed for a diagnosis"
     if why := uncommanded(recording, rig, core.inputs):
@@ -583,8 +587,8 @@ def _noise_of(recording: Recording, name: str, settings: DiagnosisSettings) -> f
     if name not in recording.logged:
         return noise_level(values, mask, seed=seed)
     apart, logged = recording.logged[name]
-    there = np.isfinite(logged)
-    single = noise_level(np.where(there, logged, 0.0), there, seed=seed)
+    known = np.isfinite(logged)
+    single = noise_level(np.where(known, logged, 0.0), known, seed=seed)
     return single * math.sqrt(max(1.0, apart / recording.sample_time))
 
 

@@ -30,17 +30,17 @@ def noted_units(case: Case) -> list[str]:
     for recording in case.recordings:
         for channel, note in recording.notes.items():
             where.setdefault(f"{channel} {note}", []).append(recording.name)
-    told = [f"{', '.join(names)}: {text}" for text, names in where.items()]
+    notes = [f"{', '.join(names)}: {text}" for text, names in where.items()]
     for source in dict.fromkeys(recording.source for recording in case.recordings):
         lefts = [recording.left for recording in case.recordings if recording.source == source]
-        lost = [part for part in lefts[0] if all(part in left for left in lefts)]
+        lost = [part for part in lefts[0] if all(part in lefts_of_one for lefts_of_one in lefts)]
         some = ", ".join(lost[:_FEW]) + " and so on" * (len(lost) > _FEW)
         if lost:
-            told.append(
+            notes.append(
                 f"{Path(source).name}: {len(lost)} of the parts of this log ({some}) are in no "
                 "recording of the case (pieces in case.toml)"
             )
-    return told
+    return notes
 
 
 def suspected_units(case: Case) -> list[str]:
@@ -64,7 +64,7 @@ def suspected_units(case: Case) -> list[str]:
             name: np.where(recording.mask[name], values, np.nan)
             for name, values in recording.channels.items()
         }
-        for found in suspicions(channels, recording.said, recording.rig_there(case.rig)):
-            where.setdefault(found.channel, []).append(recording.name)
-            evidence.setdefault(found.channel, found.text)
+        for suspicion in suspicions(channels, recording.said, recording.rig_there(case.rig)):
+            where.setdefault(suspicion.channel, []).append(recording.name)
+            evidence.setdefault(suspicion.channel, suspicion.text)
     return [f"{', '.join(where[channel])}: {text}" for channel, text in evidence.items()]

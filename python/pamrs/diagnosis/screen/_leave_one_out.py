@@ -22,7 +22,7 @@ _RIDGE = 1e-9  # keeps a matrix invertible
 
 
 def predicted_by_others(
-    problem: Problem, found: Fit, inflation: dict[str, float]
+    problem: Problem, fitted: Fit, inflation: dict[str, float]
 ) -> dict[Key, Residual]:
     """Residuals of each recording under the fit that the other recordings would have given; of a
     single recording each piece of its time under the fit that the other pieces would have given.
@@ -37,7 +37,7 @@ def predicted_by_others(
     ----------
     problem : Problem
         Blocks and recordings.
-    found : Fit
+    fitted : Fit
         A fit to all recordings.
     inflation : dict of str to float
         Variance of each block's binned residual relative to white sample noise.
@@ -47,20 +47,20 @@ def predicted_by_others(
     dict of (str, str) to Residual
         By block and recording; the fit's own where sensitivities are not known of all parameters.
     """
-    names = list(found.values)
-    found = _with_sensitivities(problem, found)
-    if not names or not _knows_all(found):
-        return found.residuals
+    names = list(fitted.values)
+    fitted = _with_sensitivities(problem, fitted)
+    if not names or not _knows_all(fitted):
+        return fitted.residuals
     # what happens at times of its own has its own size as a scale
-    scales = np.array([found.scales.get(n) or abs(found.values[n]) or 1.0 for n in names])
-    parts = _parts(problem, found)
-    sums = [_sums(problem, found, inflation, scales, part) for part in parts]
+    scales = np.array([fitted.scales.get(n) or abs(fitted.values[n]) or 1.0 for n in names])
+    parts = _parts(problem, fitted)
+    sums = [_sums(problem, fitted, inflation, scales, part) for part in parts]
     total = np.sum([normal for normal, _ in sums], axis=0) + np.diag(
-        [1.0 if name in found.held_by_prior else 0.0 for name in names]
+        [1.0 if name in fitted.held_by_prior else 0.0 for name in names]
     )
     total += _RIDGE * np.diag(np.maximum(np.diag(total), _RIDGE))
     root = np.linalg.inv(np.linalg.cholesky(total))
-    out = dict(found.residuals)
+    out = dict(fitted.residuals)
     for part, (normal, gradient) in zip(parts, sums, strict=True):
         # in these coordinates all parts together tell one unit of every direction, and `shares` of
         # it come from this one
@@ -70,35 +70,37 @@ def predicted_by_others(
             shares < _SOLE_SOURCE, step / np.maximum(1.0 - shares, 1.0 - _SOLE_SOURCE), 0.0
         )
         change = root.T @ (turn @ moved) * scales
-        for key, there in part.items():
-            own = found.residuals[key]
-            assert own.jacobian is not None
+        for key, rows in part.items():
+            residual = fitted.residuals[key]
+            assert residual.jacobian is not None
             value = out[key].value.copy()
-            value[there] = own.value[there] - own.jacobian[there] @ change
-            out[key] = replace(own, value=value)
+            value[rows] = residual.value[rows] - residual.jacobian[rows] @ change
+            out[key] = replace(residual, value=value)
     return out
 
 
-def _knows_all(found: Fit) -> bool:
+def _knows_all(fitted: Fit) -> bool:
     """True where a fit has the sensitivities to all of its parameters."""
     return all(
-        r.jacobian is not None and r.jacobian.shape[1] == len(found.values)
-        for r in found.residuals.values()
+        r.jacobian is not None and r.jacobian.shape[1] == len(fitted.values)
+        for r in fitted.residuals.values()
     )
 
 
-def _with_sensitivities(problem: Problem, found: Fit) -> Fit:
+def _with_sensitivities(problem: Problem, fitted: Fit) -> Fit:
     """A fit with the sensitivities of a single recording, where what happens in it at times of its
     own was fitted without them; of several recordings each has happenings of its own.
     """
-    if len(problem.recordings) > 1 or _knows_all(found):
-        return found
-    return replace(found, residuals=residuals(problem, found.rig, list(found.values), found.events))
+    if len(problem.recordings) > 1 or _knows_all(fitted):
+        return fitted
+    return replace(
+        fitted, residuals=residuals(problem, fitted.rig, list(fitted.values), fitted.events)
+    )
 
 
-def _parts(problem: Problem, found: Fit) -> list[dict[Key, slice]]:
+def _parts(problem: Problem, fitted: Fit) -> list[dict[Key, slice]]:
     """Samples that are left out together, by block and recording."""
-    sizes = {key: r.value.size for key, r in found.residuals.items()}
+    sizes = {key: r.value.size for key, r in fitted.residuals.items()}
     if len(problem.recordings) > 1:
         return [
             {key: slice(0, size) for key, size in sizes.items() if key[1] == p.recording.name}
@@ -117,16 +119,20 @@ def _parts(problem: Problem, found: Fit) -> list[dict[Key, slice]]:
 
 
 def _sums(
-    problem: Problem, found: Fit, inflation: dict[str, float], scales: Array, part: dict[Key, slice]
+    problem: Problem,
+    fitted: Fit,
+    inflation: dict[str, float],
+    scales: Array,
+    part: dict[Key, slice],
 ) -> tuple[Array, Array]:
     """Normal matrix and gradient from the samples of a part."""
     within = {}
-    for key, there in part.items():
-        own = found.residuals[key]
-        assert own.jacobian is not None
-        kept = np.zeros_like(own.rows)
-        kept[there] = own.rows[there]
-        within[key] = replace(own, rows=kept)
+    for key, samples in part.items():
+        residual = fitted.residuals[key]
+        assert residual.jacobian is not None
+        used = np.zeros_like(residual.rows)
+        used[samples] = residual.rows[samples]
+        within[key] = replace(residual, rows=used)
     recordings = [p for p in problem.recordings if any(p.recording.name == r for _, r in part)]
     rows, slope = stacked(replace(problem, recordings=recordings), within, inflation)
     assert slope is not None

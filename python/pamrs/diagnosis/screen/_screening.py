@@ -38,7 +38,7 @@ from pamrs.rig.schema import BLOCKS
 
 _MOST_LINEAR = 8.0  # [typical sizes] largest size at which a linear gain is relied on (decision 13)
 # [typical sizes] smallest start: a compressor may deliver 500 times less (decision 20)
-_LEAST_SIZE = 0.002
+_LEAST_SIGNATURE_SIZE = 0.002
 # [sizes tried] size below which (and from most_size) the signature is taken again there
 _REPEAT_BELOW = 0.3
 # signatures of one start at the most, each at the size that the last one suggested
@@ -146,17 +146,17 @@ class Screen:
         without : tuple of Term
             Effects to leave out, with those that cannot act beside them.
         """
-        own = self.tangent if tangent is None else tangent
-        found = []
+        space = self.tangent if tangent is None else tangent
+        scores = []
         for effect, start, signature in self.signatures:
             if effect.excluded_by(without):
                 continue
-            power = own.power(signature)
+            power = space.power(signature)
             if power < _INVISIBLE:
                 continue
-            size, gain = _best_size(float(own.left @ signature), power, start)
-            found.append(Score(effect, start, gain, size, signature))
-        return sorted(found, key=lambda s: -s.gain)
+            size, gain = _best_size(float(space.left @ signature), power, start)
+            scores.append(Score(effect, start, gain, size, signature))
+        return sorted(scores, key=lambda s: -s.gain)
 
 
 def _best_size(along: float, power: float, start: Start) -> tuple[float, float]:
@@ -168,17 +168,17 @@ def _best_size(along: float, power: float, start: Start) -> tuple[float, float]:
     """
     if power < _INVISIBLE:
         return 0.0, 0.0
-    low = -_MOST_LINEAR if start.signed else _LEAST_SIZE
+    low = -_MOST_LINEAR if start.signed else _LEAST_SIGNATURE_SIZE
     size = float(np.clip(-along / power, low, _MOST_LINEAR)) if start.scalable else 1.0
     return size, -2.0 * size * along - size**2 * power
 
 
 def by_effect(scores: list[Score]) -> dict[Term, list[Score]]:
     """Scores of each effect, effects and starts in the order of their gain."""
-    found: dict[Term, list[Score]] = {}
+    ranked: dict[Term, list[Score]] = {}
     for score in scores:
-        found.setdefault(score.effect, []).append(score)
-    return found
+        ranked.setdefault(score.effect, []).append(score)
+    return ranked
 
 
 def best_of_each_kind(scores: list[Score]) -> list[Score]:
@@ -246,18 +246,20 @@ def screen(
         Whether so much is left that a signature at one size tells little of another: each start is
         then looked at in several.
     """
-    looking = _Looking(problem, fitted, inflation, tangent_of(fitted, problem, inflation), strong)
+    search = _SignatureSearch(
+        problem, fitted, inflation, tangent_of(fitted, problem, inflation), strong
+    )
     for effect in effects:
         if not effect.at:
-            looking.seen.clear()
+            search.residuals_of.clear()
         starts = starts_of(effect, sealed=sealed)
         for form in dict.fromkeys(start.form for start in starts):
-            looking.at([start for start in starts if start.form == form])
-    return Screen(looking.tangent, looking.signatures, strong)
+            search.add_form([start for start in starts if start.form == form])
+    return Screen(search.tangent, search.signatures, strong)
 
 
 @dataclass(frozen=True, eq=False)
-class _Looking:
+class _SignatureSearch:
     """A fitted model at which signatures are taken.
 
     Attributes
@@ -277,7 +279,7 @@ class _Looking:
     everywhere : dict of values to Start
         Where the looks at an effect at every block of its kind ended, by where they began: those at
         one of these blocks begin there.
-    seen : dict of values to dict
+    residuals_of : dict of values to dict
         What it does there, by block and recording.
     """
 
@@ -288,34 +290,36 @@ class _Looking:
     strong: bool
     signatures: list[Signature] = field(default_factory=list)
     everywhere: dict[_Values, Start] = field(default_factory=dict)
-    seen: dict[_Values, dict[Key, Residual]] = field(default_factory=dict)
+    residuals_of: dict[_Values, dict[Key, Residual]] = field(default_factory=dict)
 
-    def at(self, starts: list[Start]) -> None:
+    def add_form(self, starts: list[Start]) -> None:
         """Add the signatures of one form of an effect, given all its starts."""
         first = starts[0]
         parameters = first.effect.info.form(first.form).parameters
         if any(p.scan for p in parameters):
-            for start in _scan_resonance(first, lambda start: self.try_(start, 1), self.signatures):
-                self.try_(start)
-                self.try_(_as_usual(start, first))
+            for start in _scan_resonance(
+                first, lambda start: self.add_signature(start, 1), self.signatures
+            ):
+                self.add_signature(start)
+                self.add_signature(_as_usual(start, first))
         elif any(p.role == "threshold" for p in parameters):
             before = len(self.signatures)
-            best = _find_thresholds(first, self.problem, lambda start: self.try_(start, 1))
+            best = _find_thresholds(first, self.problem, lambda start: self.add_signature(start, 1))
             self.signatures[before:] = [s for s in self.signatures[before:] if s[1] is best]
         else:
             for start in _moved_to_action(starts, self.problem, self.fitted.rig):
-                self.try_(start)
+                self.add_signature(start)
 
-    def try_(self, start: Start, looks: int | None = None) -> float:
+    def add_signature(self, start: Start, looks: int | None = None) -> float:
         """Add the signature of a start; return its gain in chi-square (minus infinity: none)."""
-        begun = self.everywhere.get(_values(start)) if start.effect.at else None
-        tried, best = start if begun is None else begun.moved(start.effect), None
+        everywhere = self.everywhere.get(_values(start)) if start.effect.at else None
+        start_tried, best = start if everywhere is None else everywhere.moved(start.effect), None
         for _ in range(_MOST_SIGNATURES if looks is None else looks):
-            seen = self._look(tried)
-            if seen is None:
+            shown = self._signature_of(start_tried)
+            if shown is None:
                 break
-            best = seen
-            score = seen[1]
+            best = shown
+            score = shown[1]
             if (
                 score is None
                 or score.gain <= 0.0
@@ -325,15 +329,15 @@ class _Looking:
                 break
             # what a stop or a threshold does is not in proportion to its size: it is looked at
             # where it would be
-            wanted = tried.scaled(abs(score.size))
-            if wanted == tried:
+            wanted = start_tried.scaled(abs(score.size))
+            if wanted == start_tried:
                 break  # its bounds hold it
-            tried = wanted
-        if self.strong and start.scalable and looks is None and begun is None:
-            others = [self._look(start.scaled(size)) for size in STRONG_SIZES]
+            start_tried = wanted
+        if self.strong and start.scalable and looks is None and everywhere is None:
+            others = [self._signature_of(start.scaled(size)) for size in STRONG_SIZES]
             # what a signature says of other sizes than its own is not relied on
-            known = [seen for seen in (best, *others) if seen is not None]
-            best = max(known, key=lambda seen: self._taken(seen[0]), default=None)
+            known = [shown for shown in (best, *others) if shown is not None]
+            best = max(known, key=lambda shown: self._taken(shown[0]), default=None)
         if best is None:
             return -math.inf
         self.signatures.append(best[0])
@@ -341,15 +345,15 @@ class _Looking:
             self.everywhere[_values(start)] = best[0][1]
         return -math.inf if best[1] is None else best[1].gain
 
-    def _look(self, start: Start) -> tuple[Signature, Score | None] | None:
+    def _signature_of(self, start: Start) -> tuple[Signature, Score | None] | None:
         """The signature of a start and its score; None where the model cannot be run so."""
         what = f"the signature of {start.effect}"
-        found = self.problem.losses.part(what, lambda: self._changes(start))
-        if found is None:
+        block_residuals = self.problem.losses.part(what, lambda: self._changes(start))
+        if block_residuals is None:
             return None
         if not start.effect.at:
-            self.seen[_values(start)] = found
-        rows, _ = stacked(self.problem, found, self.inflation)
+            self.residuals_of[_values(start)] = block_residuals
+        rows, _ = stacked(self.problem, block_residuals, self.inflation)
         entry = (start.effect, start, rows - self.tangent.rows)
         return entry, next(iter(Screen(self.tangent, [entry]).scores()), None)
 
@@ -369,13 +373,13 @@ class _Looking:
         those of the effect everywhere.
         """
         term = start.effect
-        seen = self.seen.get(_values(start), {}) if term.at else {}
-        if not seen:
+        everywhere = self.residuals_of.get(_values(start), {}) if term.at else {}
+        if not everywhere:
             return {}
         others = places_of(self.fitted.rig, term.id, self.problem.blocks)
         rivals = [t for at in others if (t := Term(term.id, at)) != term]
-        own = {b.name for b in self.problem.blocks if not any(acts_in(t, b) for t in rivals)}
-        return {key: r for key, r in seen.items() if key[0] in own}
+        alone = {b.name for b in self.problem.blocks if not any(acts_in(t, b) for t in rivals)}
+        return {key: r for key, r in everywhere.items() if key[0] in alone}
 
     def _taken(self, entry: Signature) -> float:
         """Reduction of the chi-square by a start at its own size."""
@@ -387,19 +391,19 @@ class _Looking:
 def _values(start: Start) -> _Values:
     """Effect, form and values of a start, wherever it acts."""
     values = start.free | start.held
-    own = tuple(sorted((n.removeprefix(str(start.effect)), v) for n, v in values.items()))
-    return start.effect.id, start.form, own
+    unplaced = tuple(sorted((n.removeprefix(str(start.effect)), v) for n, v in values.items()))
+    return start.effect.id, start.form, unplaced
 
 
 def _measured(problem: Problem, channel: str) -> Array | None:
     """Everything that was measured of the channels of one kind; None where there is none."""
-    seen = [
+    measured = [
         p.signals[name][0]
         for p in problem.recordings
         for name in p.signals
         if channel_of(name) == channel
     ]
-    return np.concatenate(seen) if seen else None
+    return np.concatenate(measured) if measured else None
 
 
 def _moved_to_action(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
@@ -427,7 +431,7 @@ def _moved_to_action(starts: list[Start], problem: Problem, rig: Rig) -> list[St
 
 
 def _scan_resonance(
-    start: Start, try_: Callable[[Start], float], signatures: list[Signature]
+    start: Start, add_signature: Callable[[Start], float], signatures: list[Signature]
 ) -> list[Start]:
     """Starts at the frequencies that gain most among many: what swings long has to be met within a
     few percent of its frequency.
@@ -441,16 +445,16 @@ def _scan_resonance(
     broad = {f"{start.effect}.{p.name}": p.tried for p in parameters if p.tried is not None}
     before = len(signatures)
     name = f"{start.effect}.{scanned.name}"
-    tried = [
+    starts = [
         replace(start, free=start.free | {name: float(x)} | broad)
         for x in np.geomspace(*scanned.scan)
     ]
-    gains = [try_(one) for one in tried]
+    gains = [add_signature(one) for one in starts]
     del signatures[before:]
-    order = sorted(range(len(tried)), key=lambda k: -gains[k])
+    order = sorted(range(len(starts)), key=lambda k: -gains[k])
     # the best and the best that is no neighbour of it
     far = [k for k in order[1:] if abs(k - order[0]) > 1]
-    return [tried[k] for k in (order[0], *far[:1])]
+    return [starts[k] for k in (order[0], *far[:1])]
 
 
 def _as_usual(start: Start, first: Start) -> Start:
@@ -499,7 +503,7 @@ def _shows(start: Start, block: Block) -> bool:
 
 
 def _find_thresholds(
-    start: Start, problem: Problem, try_: Callable[[Start], float]
+    start: Start, problem: Problem, add_signature: Callable[[Start], float]
 ) -> Start | None:
     """The levels of a channel between which something switches: over the range that was seen, then
     closer and closer.
@@ -507,33 +511,38 @@ def _find_thresholds(
     A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
     """
     on, off = start.effect.info.with_role("threshold")
-    seen = _measured(problem, on.channel)
-    if seen is None:
+    measured = _measured(problem, on.channel)
+    if measured is None:
         return None
-    low, high = (float(f(seen)) for f in (np.min, np.max))
+    low, high = (float(f(measured)) for f in (np.min, np.max))
     step = (high - low) / _THRESHOLD_LEVELS
     if step <= 0.0:
         return None
 
     def at(switch_on: float, switch_off: float) -> Start:
-        own = {f"{start.effect}.{on.name}": switch_on, f"{start.effect}.{off.name}": switch_off}
+        thresholds = {
+            f"{start.effect}.{on.name}": switch_on,
+            f"{start.effect}.{off.name}": switch_off,
+        }
         return replace(
-            start, free={n: v for n, v in start.free.items() if n not in own}, held=start.held | own
+            start,
+            free={n: v for n, v in start.free.items() if n not in thresholds},
+            held=start.held | thresholds,
         )
 
     levels = [low + (k + 0.5) * step for k in range(_THRESHOLD_LEVELS)]
-    tried = [
-        (try_(s), a, b, s)
+    pairs = [
+        (add_signature(s), a, b, s)
         for a in levels
         for b in (*levels, high + step)
         if b > a
         for s in [at(a, b)]
     ]
-    best = max(tried, key=lambda t: t[0])
+    best = max(pairs, key=lambda t: t[0])
     while step > _THRESHOLD_PRECISION * (high - low):
         step *= 0.5
         _, a, b, _ = best
         around = [(a - step, b), (a + step, b), (a, b - step), (a, b + step)]
-        tried = [(try_(s), c, d, s) for c, d in around if 0.0 < c < d for s in [at(c, d)]]
-        best = max([best, *tried], key=lambda t: t[0])
+        pairs = [(add_signature(s), c, d, s) for c, d in around if 0.0 < c < d for s in [at(c, d)]]
+        best = max([best, *pairs], key=lambda t: t[0])
     return best[3]

@@ -43,24 +43,26 @@ def with_autocorrelation(
     autocorrelation = autocorrelation_of(problem, first, noise_level)
     if autocorrelation.largest <= CORRELATED_VARIANCE:
         return first, autocorrelation
-    found = thorough(problem, nominal, autocorrelation, first)
+    fitted = thorough(problem, nominal, autocorrelation, first)
     for _ in range(_MOST_OWN_WEIGHTINGS if autocorrelation.apart else 0):
         # what stands apart had moved the baseline, and that missed the others
-        last, autocorrelation = autocorrelation, autocorrelation_of(problem, found, noise_level)
-        found = thorough(problem, nominal, autocorrelation, found)
+        last, autocorrelation = autocorrelation, autocorrelation_of(problem, fitted, noise_level)
+        fitted = thorough(problem, nominal, autocorrelation, fitted)
         if all(CORRELATED_VARIANCE * now >= last[name] for name, now in autocorrelation.items()):
             break
-    _tell_of_apart(problem, found, autocorrelation)
-    if any(abs(moved) >= WALL_TOLERANCES for moved in found.moved.values()):
-        found = min(found, thorough(problem, nominal, autocorrelation, None), key=lambda f: f.cost)
-    return found, autocorrelation
+    _tell_of_apart(problem, fitted, autocorrelation)
+    if any(abs(moved) >= WALL_TOLERANCES for moved in fitted.moved.values()):
+        fitted = min(
+            fitted, thorough(problem, nominal, autocorrelation, None), key=lambda f: f.cost
+        )
+    return fitted, autocorrelation
 
 
-def _tell_of_apart(problem: Problem, found: Fit, weights: Weights) -> None:
+def _tell_of_apart(problem: Problem, fitted: Fit, weights: Weights) -> None:
     """Name the recordings that a refit misses by far more than the others."""
     for block, name in weights.apart:
         missed = {
-            p.recording.name: _noise_levels(found.residuals[block, p.recording.name])
+            p.recording.name: _noise_levels(fitted.residuals[block, p.recording.name])
             for p in problem.recordings
         }
         most = max(missed[n] for n in missed if (block, n) not in weights.apart)
@@ -71,10 +73,10 @@ def _tell_of_apart(problem: Problem, found: Fit, weights: Weights) -> None:
         )
 
 
-def _noise_levels(found: Residual) -> float:
+def _noise_levels(residual: Residual) -> float:
     """Root mean square of a residual in noise levels."""
-    count = max(1, int(found.rows.sum()))
-    return float(np.linalg.norm(found.value[found.rows])) / math.sqrt(count) / found.noise
+    count = max(1, int(residual.rows.sum()))
+    return float(np.linalg.norm(residual.value[residual.rows])) / math.sqrt(count) / residual.noise
 
 
 def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: Fit | None) -> Fit:
@@ -117,12 +119,12 @@ def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit
         return first
 
 
-def _as_the_others(problem: Problem, nominal: Rig, inflation: dict[str, float], found: Fit) -> Fit:
+def _as_the_others(problem: Problem, nominal: Rig, inflation: dict[str, float], fitted: Fit) -> Fit:
     """A refit with the values that all recordings have but the one that is missed most, where that
     one makes most of what the others are missed by; else as it is.
     """
     missed = {
-        p.recording.name: max(map(_noise_levels, _of(p, found.residuals)))
+        p.recording.name: max(map(_noise_levels, _of(p, fitted.residuals)))
         for p in problem.recordings
     }
     worst = max(missed, key=lambda name: missed[name])
@@ -130,11 +132,11 @@ def _as_the_others(problem: Problem, nominal: Rig, inflation: dict[str, float], 
         problem, recordings=[p for p in problem.recordings if p.recording.name != worst]
     )
     if len(others.recordings) < _LEAST_OTHERS:
-        return found
+        return fitted
     alone = thorough(others, nominal, inflation, None)
-    beside, _ = stacked(others, found.residuals, inflation)
+    beside, _ = stacked(others, fitted.residuals, inflation)
     if float(beside @ beside) < _DRAGGED * 2.0 * alone.cost:
-        return found
+        return fitted
     return fit(problem, nominal, (), {}, inflation, warm=alone, evaluations=1)
 
 
@@ -162,5 +164,7 @@ def _check_moved(problem: Problem, nominal: Rig, inflation: dict[str, float], fi
         )
 
 
-def _of(prepared: Prepared, found: dict[Key, Residual]) -> list[Residual]:
-    return [r for (_, recording), r in found.items() if recording == prepared.recording.name]
+def _of(prepared: Prepared, block_residuals: dict[Key, Residual]) -> list[Residual]:
+    return [
+        r for (_, recording), r in block_residuals.items() if recording == prepared.recording.name
+    ]

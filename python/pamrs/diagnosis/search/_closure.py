@@ -138,20 +138,26 @@ def find_closure(
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
-    chosen = _select(_Stacked.of(problem, baseline, baseline, inflation), candidates, columns, {})
-    found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
-    if found is None:
+    chosen = _select(
+        _StackedFit.of(problem, baseline, baseline, inflation), candidates, columns, {}
+    )
+    first = (
+        None if chosen is None else _fit_terms(problem, nominal, baseline, inflation, chosen, say)
+    )
+    if first is None:
         return None
-    autocorrelation = autocorrelation_of(problem, found, noise_level or {})
-    candidates, columns, warm = _again(problem, baseline, found, autocorrelation, blocks, closures)
+    autocorrelation = autocorrelation_of(problem, first, noise_level or {})
+    candidates, columns, warm = _at_first_fit(
+        problem, baseline, first, autocorrelation, blocks, closures
+    )
     second = _select(
-        _Stacked.of(problem, warm, found, autocorrelation), candidates, columns, found.values
+        _StackedFit.of(problem, warm, first, autocorrelation), candidates, columns, first.values
     )
     other = (
-        None if second is None else _fitted(problem, nominal, warm, autocorrelation, second, say)
+        None if second is None else _fit_terms(problem, nominal, warm, autocorrelation, second, say)
     )
-    return _better(
-        [baseline, found, *([] if other is None else [other])],
+    return _best_model(
+        [baseline, first, *([] if other is None else [other])],
         problem,
         autocorrelation,
         len(candidates),
@@ -160,13 +166,13 @@ def find_closure(
 
 def _closures(blocks: Sequence[Block]) -> dict[str, str]:
     """Closures by the block that each acts in."""
-    found = {b.name: b.closure for b in blocks}
-    unknown = [name for name, closure in found.items() if closure is None]
+    closures = {b.name: b.closure for b in blocks}
+    unknown = [name for name, closure in closures.items() if closure is None]
     if unknown or not blocks:
         raise DiagnosisError(
             f"blocks = {unknown} is not allowed: one or more of {', '.join(CLOSURE_OF)}"
         )
-    return {name: closure for name, closure in found.items() if closure is not None}
+    return {name: closure for name, closure in closures.items() if closure is not None}
 
 
 def _shapes(closure: str) -> dict[str, tuple[float, ...]]:
@@ -185,12 +191,12 @@ def _columns(
     """Derivative of the stacked residuals of the whole problem with respect to coefficients that
     act in some of its blocks.
     """
-    found = residuals(replace(problem, blocks=blocks), rig, names)
+    with_slopes = residuals(replace(problem, blocks=blocks), rig, names)
     full = {
         key: replace(r, jacobian=np.zeros((r.value.size, len(names))))
         for key, r in base.residuals.items()
     }
-    _, columns = stacked(problem, full | found, inflation)
+    _, columns = stacked(problem, full | with_slopes, inflation)
     assert columns is not None
     return columns
 
@@ -205,14 +211,14 @@ def _at_zero(
     """Every term at every shape of its memory, and what each does to the stacked residuals per unit
     of its coefficient (n, m).
     """
-    tried = {closure: _shapes(closure) for closure in closures.values()}
-    rounds = max(len(values) for shapes in tried.values() for values in shapes.values())
+    shapes_tried = {closure: _shapes(closure) for closure in closures.values()}
+    rounds = max(len(values) for shapes in shapes_tried.values() for values in shapes.values())
     candidates: list[_ShapedTerm] = []
     columns = []
     for k in range(rounds):
         rig = baseline.rig
         now: list[_ShapedTerm] = []
-        for closure, shapes in tried.items():
+        for closure, shapes in shapes_tried.items():
             here = {name: values[min(k, len(values) - 1)] for name, values in shapes.items()}
             rig = rig.with_effect(closure, here)
             for term in CLOSURE_TERMS[closure]:
@@ -224,10 +230,10 @@ def _at_zero(
     return candidates, np.concatenate(columns, axis=1)
 
 
-def _again(
+def _at_first_fit(
     problem: Problem,
     baseline: Fit,
-    found: Fit,
+    fitted: Fit,
     inflation: dict[str, float],
     blocks: list[Block],
     closures: dict[str, str],
@@ -235,9 +241,9 @@ def _again(
     """Terms and columns as of `_at_zero`, at a fitted closure with its memories; and the baseline
     there, with sensitivities next to the closure.
     """
-    rig = found.rig
+    rig = fitted.rig
     for closure in closures.values():
-        if Term(closure) not in found.effects:
+        if Term(closure) not in fitted.effects:
             rig = rig.with_effect(closure)
     shapes = {e["id"]: e["parameters"] for e in rig.effects}
     candidates = [
@@ -249,17 +255,17 @@ def _again(
     ]
     names = list(baseline.values)
     evaluated = residuals(problem, rig, [*names, *(c.name for c in candidates)])
-    own = {
+    baseline_residuals = {
         key: replace(r, jacobian=None if r.jacobian is None else r.jacobian[:, : len(names)])
         for key, r in evaluated.items()
     }
-    values = {name: found.values[name] for name in names}
+    values = {name: fitted.values[name] for name in names}
     warm = replace(
         baseline,
-        rig=found.rig,
+        rig=fitted.rig,
         values=values,
-        residuals=own,
-        moved={name: found.moved[name] for name in names},
+        residuals=baseline_residuals,
+        moved={name: fitted.moved[name] for name in names},
     )
     _, every = stacked(problem, evaluated, inflation)
     assert every is not None
@@ -267,7 +273,7 @@ def _again(
 
 
 @dataclass(frozen=True, eq=False)
-class _Stacked:
+class _StackedFit:
     """Stacked residuals of a fit, with what the baseline can do next to a closure.
 
     Attributes
@@ -291,9 +297,11 @@ class _Stacked:
     series: list[slice]
 
     @staticmethod
-    def of(problem: Problem, baseline: Fit, found: Fit, inflation: dict[str, float]) -> _Stacked:
+    def of(
+        problem: Problem, baseline: Fit, fitted: Fit, inflation: dict[str, float]
+    ) -> _StackedFit:
         """Residuals of a fit, sensitivities of the baseline it grew from."""
-        rows, _ = stacked(problem, found.residuals, inflation)
+        rows, _ = stacked(problem, fitted.residuals, inflation)
         _, jacobian = stacked(problem, baseline.residuals, inflation)
         names = list(baseline.values)
         scales = np.array([baseline.scales[name] for name in names])
@@ -304,16 +312,16 @@ class _Stacked:
                 key = (block.name, prepared.recording.name)
                 size = stacked(
                     replace(problem, blocks=[block], recordings=[prepared]),
-                    {key: found.residuals[key]},
+                    {key: fitted.residuals[key]},
                     inflation,
                 )[0].size
                 series.append(slice(start, start + size))
                 recording.append(np.full(size, k))
                 start += size
-        return _Stacked(
+        return _StackedFit(
             rows,
             freedom,
-            np.array([found.moved[name] for name in names]),
+            np.array([fitted.moved[name] for name in names]),
             np.concatenate(recording),
             series,
         )
@@ -337,7 +345,7 @@ def _price(samples: float, among: int) -> float:
     return math.log(samples) + 2.0 * math.log(among)
 
 
-def _better(
+def _best_model(
     models: list[Fit], problem: Problem, inflation: dict[str, float], among: int
 ) -> Fit | None:
     """Best model by misfit and price, on the independent samples of the least misfit; None for the
@@ -356,7 +364,7 @@ def _better(
     """
     misfits = [with_priors(problem, model, inflation) for model in models]
     least = models[int(np.argmin(misfits))]
-    frame = _Stacked.of(problem, models[0], least, inflation)
+    frame = _StackedFit.of(problem, models[0], least, inflation)
     samples = frame.independent(frame.rows)
     worth = [
         -samples * math.log(misfit) - len(model.effect_values) * _price(samples, among)
@@ -368,7 +376,7 @@ def _better(
 
 
 def _select(
-    frame: _Stacked,
+    frame: _StackedFit,
     candidates: list[_ShapedTerm],
     columns: Array,
     present: dict[str, float],
@@ -385,7 +393,7 @@ def _select(
 
     Parameters
     ----------
-    frame : _Stacked
+    frame : _StackedFit
         Residuals to explain and what the baseline can do.
     candidates : list of _ShapedTerm
         Terms.
@@ -410,7 +418,7 @@ def _select(
         q, _ = np.linalg.qr(np.concatenate([frame.freedom, np.eye(b)]))
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
-    crossed = _Crossed.of(frame, rows, unit)
+    crossed = _LeaveOneOut.of(frame, rows, unit)
     chosen = _Selection(candidates, target, wide, _LEAST_POWER)
     for k, candidate in enumerate(candidates):
         if candidate.name in present and usable[k] and chosen.power(k) > _LEAST_POWER:
@@ -431,8 +439,8 @@ def _select(
         price = new * _price(here, len(candidates))
         if outer > 0.0 and (inner > price or (outer > price and inner > new * math.log(here))):
             taken, misfit, proof, samples = len(order), now, outside, here
-    kept = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
-    return _solved(frame, candidates, rows, unit, size, kept) if kept else None
+    pruned = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
+    return _solved(frame, candidates, rows, unit, size, pruned) if pruned else None
 
 
 class _Selection:
@@ -485,52 +493,54 @@ class _Selection:
 
 
 def _solved(
-    frame: _Stacked,
+    frame: _StackedFit,
     candidates: list[_ShapedTerm],
     rows: Array,
     unit: Array,
     size: Array,
-    kept: list[int],
+    taken: list[int],
 ) -> _Choice:
     """Coefficients of the terms that are kept, the baseline moving freely inside its tolerances."""
     b = frame.freedom.shape[1]
     baseline = np.concatenate([frame.freedom, np.eye(b)])
-    terms = np.concatenate([unit[:, kept], np.zeros((b, len(kept)))])
+    terms = np.concatenate([unit[:, taken], np.zeros((b, len(taken)))])
     design = np.concatenate([baseline, terms], axis=1)
     solution, *_ = np.linalg.lstsq(design, -np.concatenate([rows, frame.moved]), rcond=1e-10)
     values = {
         candidates[k].name: float(v) / float(size[k])
-        for k, v in zip(kept, solution[b:], strict=True)
+        for k, v in zip(taken, solution[b:], strict=True)
     }
     shapes = {
-        c.memory: c.shape for c in (candidates[k] for k in kept) if c.memory and c.shape is not None
+        c.memory: c.shape
+        for c in (candidates[k] for k in taken)
+        if c.memory and c.shape is not None
     }
     return _Choice(values, shapes, solution[:b])
 
 
 def _pruned(
-    target: Array, wide: Array, kept: list[int], misfit: float, samples: float, price: float
+    target: Array, wide: Array, taken: list[int], misfit: float, samples: float, price: float
 ) -> list[int]:
     """Terms without those that others have made needless: backward, the cheapest first, while its
     loss is less than its price.
     """
 
     def without(k: int) -> float:
-        others = wide[:, [j for j in kept if j != k]]
+        others = wide[:, [j for j in taken if j != k]]
         solution, *_ = np.linalg.lstsq(others, target, rcond=1e-10)
         return float(np.sum((target - others @ solution) ** 2))
 
-    while kept:
-        losses = {k: without(k) for k in kept}
-        cheapest = min(kept, key=lambda k: losses[k])
+    while taken:
+        losses = {k: without(k) for k in taken}
+        cheapest = min(taken, key=lambda k: losses[k])
         if samples * math.log(losses[cheapest] / max(misfit, 1e-300)) > price:
             break
-        kept, misfit = [k for k in kept if k != cheapest], losses[cheapest]
-    return kept
+        taken, misfit = [k for k in taken if k != cheapest], losses[cheapest]
+    return taken
 
 
 @dataclass(frozen=True, eq=False)
-class _Crossed:
+class _LeaveOneOut:
     """Normal equations of baseline and terms by recording, to leave one out at a time.
 
     Attributes
@@ -545,10 +555,10 @@ class _Crossed:
     prior: Array
 
     @staticmethod
-    def of(frame: _Stacked, rows: Array, unit: Array) -> _Crossed:
+    def of(frame: _StackedFit, rows: Array, unit: Array) -> _LeaveOneOut:
         everything = np.concatenate([frame.freedom, unit, rows[:, None]], axis=1)
         parts = [everything[frame.recording == k] for k in np.unique(frame.recording)]
-        return _Crossed(np.array([part.T @ part for part in parts]), frame.moved)
+        return _LeaveOneOut(np.array([part.T @ part for part in parts]), frame.moved)
 
     def left_out(self, terms: Sequence[int]) -> float:
         """Misfit of each recording by the baseline and terms that the others ask for, summed; with
@@ -558,22 +568,22 @@ class _Crossed:
         index = np.array([*range(b), *(b + t for t in terms)], dtype=np.int64)
         total = self.grams.sum(axis=0)
         misfit = 0.0
-        for own in self.grams:
-            rest = total - own if len(self.grams) > 1 else total
+        for gram in self.grams:
+            rest = total - gram if len(self.grams) > 1 else total
             normal = rest[np.ix_(index, index)].copy()
             right = -rest[index, -1].copy()
             normal[np.arange(b), np.arange(b)] += 1.0
             right[:b] -= self.prior
             solution = np.linalg.lstsq(normal, right, rcond=1e-12)[0]
             misfit += float(
-                own[-1, -1]
-                + 2.0 * solution @ own[index, -1]
-                + solution @ own[np.ix_(index, index)] @ solution
+                gram[-1, -1]
+                + 2.0 * solution @ gram[index, -1]
+                + solution @ gram[np.ix_(index, index)] @ solution
             )
         return misfit
 
 
-def _fitted(
+def _fit_terms(
     problem: Problem,
     nominal: Rig,
     warm: Fit,
@@ -602,7 +612,7 @@ def _fitted(
             for n, x in zip(names, chosen.shift, strict=True)
         }
         try:
-            tried = fit(
+            fitted = fit(
                 problem,
                 nominal,
                 effects,
@@ -614,8 +624,8 @@ def _fitted(
             )
         except SimulationError:
             continue
-        if best is None or tried.cost < best.cost:
-            best = tried
+        if best is None or fitted.cost < best.cost:
+            best = fitted
         if 2.0 * best.cost < with_priors(problem, warm, inflation):
             break
     return best

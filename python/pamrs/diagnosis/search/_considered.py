@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from pamrs.diagnosis.evidence import Candidate
+from pamrs.diagnosis.evidence import FittedHypothesis
 from pamrs.diagnosis.fit import Start, concerns, starts_of
 from pamrs.diagnosis.screen import STRONG_SIZES
 from pamrs.diagnosis.search._sets import Search
 from pamrs.effects import Hypothesis, Term
 
 
-def fit_considered(search: Search) -> list[Candidate]:
+def fit_considered(search: Search) -> list[FittedHypothesis]:
     """Fit what of each hypothesis that the caller asks for acts in the blocks of a mismatch."""
-    trial, found = search.trial, list[Candidate]()
-    for asked in trial.inner.considered:
-        acting = [t for t in asked.terms if any(concerns(t, b) for b in trial.suspects)]
+    trial, fitted = search.trial, list[FittedHypothesis]()
+    for hypothesis in trial.inner.considered:
+        acting = [t for t in hypothesis.terms if any(concerns(t, b) for b in trial.suspects)]
         # what may happen at times of its own is looked for beside what lasts
         effects = sorted(
             (t for t in acting if t.is_effect),
@@ -26,31 +26,31 @@ def fit_considered(search: Search) -> list[Candidate]:
         best = search.start if not wrong else trial.fit_freed(wrong, search.start.fit)
         for effect in effects:
             best = None if best is None else _add_effect(search, best, effect)
-        found += [] if best is None else [best]
-    return found
+        fitted += [] if best is None else [best]
+    return fitted
 
 
-def _add_effect(search: Search, beside: Candidate, effect: Term) -> Candidate | None:
+def _add_effect(search: Search, beside: FittedHypothesis, effect: Term) -> FittedHypothesis | None:
     """Add an effect to a set, from the start of each form that leaves least in a few steps."""
     info, trial = effect.info, search.trial
     if beside.fit.events is not None:
         return None  # beside events nothing else is fitted
     if not info.lasting:
         return trial.fit_events(effect if info.own else Term(effect.id), beside)
-    begun = trial.starts_of(beside)
-    short: dict[str, list[Candidate]] = {}
+    starts = trial.starts_of(beside)
+    short: dict[str, list[FittedHypothesis]] = {}
     for one in _possible_starts(search, beside, effect):
-        tried = trial.fit_shortly([*begun, one], beside.fit, beside.wrong)
-        if tried is not None:
-            short.setdefault(one.form, []).append(tried)
-    near = (max(tried, key=search.weight) for tried in short.values())
+        candidate = trial.fit_shortly([*starts, one], beside.fit, beside.wrong)
+        if candidate is not None:
+            short.setdefault(one.form, []).append(candidate)
+    near = (max(candidate, key=search.weight) for candidate in short.values())
     ended = [trial.fit_together(trial.starts_of(best), best.fit, best.wrong) for best in near]
     if info.transient:
         ended.append(trial.fit_events(Term(effect.id), beside))
     return max((c for c in ended if c is not None), key=search.weight, default=None)
 
 
-def _possible_starts(search: Search, beside: Candidate, effect: Term) -> list[Start]:
+def _possible_starts(search: Search, beside: FittedHypothesis, effect: Term) -> list[Start]:
     """Starts of an effect next to a set: those of the screen, which knows resonances and places of
     contact, and those of the catalogue in several sizes.
     """

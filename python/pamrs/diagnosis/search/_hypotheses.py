@@ -18,7 +18,7 @@ from pamrs.diagnosis.evidence import (
     SHARED_ODDS,
     Attempts,
     BlockGroup,
-    Candidate,
+    FittedHypothesis,
     Weighing,
     are_alike,
     explains,
@@ -120,8 +120,8 @@ _NEAR_START = 0.6
 _NEAR_FORM = 0.3  # share of the best gain that fits another form: strong effects are not linear
 _MOST_FORMS = 4  # forms of an effect that are fitted
 _EFFECTS_WITH_STARTS = 3  # effects of which more than one start is fitted (decision 13)
-_REFITTED = 0.3  # share of the work on some blocks that their refit is
-_SCREENED = 0.6  # share that it is up to the fits of what the screen found
+_REFIT_SHARE = 0.3  # share of the work on some blocks that their refit is
+_SCREEN_SHARE = 0.6  # share that it is up to the fits of what the screen found
 # share of the error that was taken below which what a hypothesis leaves is clearly less
 _CLEARLY_LESS = 0.5
 _POLISH_FROM = 0.03  # probability from which a hypothesis is fitted to its end (decision 22)
@@ -159,44 +159,44 @@ def examine(
     """
     losses, through = fitted.losses, (SimulationError,)
 
-    def judged(blocks: Sequence[Block]) -> None:
-        names = " and ".join(b.name for b in blocks)
-        say(Line(f"{names}: judged", 1.0, part=names))
+    def tell_judged(blocks: Sequence[Block]) -> None:
+        part = " and ".join(b.name for b in blocks)
+        say(Line(f"{part}: judged", 1.0, part=part))
 
     def begin(blocks: list[Block]) -> Mismatch | OnlyNoise | None:
         what = f"the judgement of {' and '.join(b.name for b in blocks)}"
         work = partial(_begin_part, fitted, held, nominal, blocks, say)
-        found = losses.part(what, work, through=through)
-        if found is None:
-            judged(blocks)
-        return found
+        part = losses.part(what, work, through=through)
+        if part is None:
+            tell_judged(blocks)
+        return part
 
     def end(part: Mismatch | OnlyNoise | None) -> list[BlockGroup]:
         if part is None:
             return []
-        others = [p for p in begun if isinstance(p, Mismatch) and p is not part]
+        others = [p for p in examined if isinstance(p, Mismatch) and p is not part]
         # where only noise is left nothing parts the names that are open elsewhere
         sure = others if isinstance(part, Mismatch) else [p for p in others if p.is_settled]
-        own = part.refit.trial.suspects if isinstance(part, Mismatch) else part.group.blocks
-        starts = [s for p in sure for s in p.leading if any(acts_in(s.effect, b) for b in own)]
+        blocks = part.refit.trial.suspects if isinstance(part, Mismatch) else part.group.blocks
+        starts = [s for p in sure for s in p.leading if any(acts_in(s.effect, b) for b in blocks)]
         names = " and ".join(b.name for b in part.refit.trial.inner.blocks)
-        beside = losses.part(
+        joined = losses.part(
             f"what other blocks name, tried in {names},",
             lambda: part.with_effects_of_others(starts) if starts else part,
             part,
             through=through,
         )
         what = f"the judgement of {names}"
-        found = losses.part(what, lambda: beside.groups(say), [], through=through)
-        judged(part.refit.trial.inner.blocks)
-        return found
+        groups = losses.part(what, lambda: joined.groups(say), [], through=through)
+        tell_judged(part.refit.trial.inner.blocks)
+        return groups
 
     # two processors are kept busy by recordings and parts; threads of the linear algebra would only
     # wait for each other
     with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(len(parts)) as pool:
         try:
-            begun = list(pool.map(begin, parts))
-            return [group for groups in pool.map(end, begun) for group in groups]
+            examined = list(pool.map(begin, parts))
+            return [group for groups in pool.map(end, examined) for group in groups]
         except BaseException:
             fitted.stopped.set()
             raise
@@ -210,29 +210,37 @@ def _begin_part(
     names = " and ".join(b.name for b in blocks)
 
     def tell(text: str) -> None:
-        own = text if isinstance(text, Line) else Line(text)
-        say(Line(f"{names}: {text}", own.share, part=names))
+        line = text if isinstance(text, Line) else Line(text)
+        say(Line(f"{names}: {text}", line.share, part=names))
 
     tell(Line("refitting the baseline inside its tolerances", 0.0))
     refit = _refit(inner, outer, nominal, same=held is fitted)
-    kept = refit.start.fitted
-    if _is_marginal(refit) or not any(significant(kept[b.name]) for b in refit.trial.suspects):
+    fitted_excess = refit.start.fitted
+    if _is_marginal(refit) or not any(
+        significant(fitted_excess[b.name]) for b in refit.trial.suspects
+    ):
         what = "the search for effects inside the error of the model"
-        less = inner.losses.part(what, lambda: _hidden(refit, tell), None)
-        if less is not None:
-            return _tried(less, tell)
-    if refit.apart and not any(significant(kept[b.name]) for b in refit.trial.suspects):
+        smaller = inner.losses.part(
+            what, lambda: _refit_with_smaller_model_error(refit, tell), None
+        )
+        if smaller is not None:
+            return _fit_hypotheses(smaller, tell)
+    if refit.held_out_alone and not any(
+        significant(fitted_excess[b.name]) for b in refit.trial.suspects
+    ):
         what = "the common fit of all recordings"
         common = inner.losses.part(what, lambda: _fit_all_recordings(refit.trial, refit.start))
         if common is not None:
             tell("one baseline leaves noise in all recordings")
             return OnlyNoise(refit, _healthy_group(refit, common), tell)
     if refit.trial.suspects:
-        return _tried(refit, tell)
+        return _fit_hypotheses(refit, tell)
     return OnlyNoise(refit, refit.group([refit.start], {UNDECIDED: 1.0}, None), tell)
 
 
-def _behind_values(refit: _Refit, tell: Say, *, effects: bool) -> dict[Candidate, float]:
+def _find_hidden_by_values(
+    refit: _Refit, tell: Say, *, effects: bool
+) -> dict[FittedHypothesis, float]:
     """Hypotheses of blocks whose baseline leaves only noise, but moves parameters for it, each with
     the logarithm of what it costs: values that the file may be wrong about and, if asked for,
     effects, which the values may have followed.
@@ -240,15 +248,15 @@ def _behind_values(refit: _Refit, tell: Say, *, effects: bool) -> dict[Candidate
     trial, baseline = refit.trial, refit.start.fit
     settings = trial.settings
     if not effects:
-        found = free_suspects(trial, baseline, baseline, tell, share=0.0)
-        return {c: price_of_wrong(c, settings) for c in found}
-    work = _begun(refit, tell)
-    singles = [*_fit_singles(work.search), *_fit_events(work.search, work.own)]
-    there = [c for c in singles if not is_absent(c, settings.most_tolerances)]
-    near = work.search.heaviest_first(there)[: settings.most_polished]
-    ended = [trial.polish(c) if c in near else c for c in there]
-    return {c: price_of_wrong(c, settings) for c in work.mistaken} | {
-        c: prior_loss(c, work.search.weighing) for c in ended
+        freed = free_suspects(trial, baseline, baseline, tell, share=0.0)
+        return {c: price_of_wrong(c, settings) for c in freed}
+    state = _screen_mismatch(refit, tell)
+    singles = [*_fit_singles(state.search), *_fit_events(state.search, state.per_recording)]
+    present = [c for c in singles if not is_absent(c, settings.most_tolerances)]
+    near = state.search.heaviest_first(present)[: settings.most_polished]
+    ended = [trial.polish(c) if c in near else c for c in present]
+    return {c: price_of_wrong(c, settings) for c in state.mistaken} | {
+        c: prior_loss(c, state.search.weighing) for c in ended
     }
 
 
@@ -260,17 +268,17 @@ class _Refit:
     ----------
     trial : Attempts
         Recordings, model, noise levels, and the blocks that keep an excess.
-    first : Fit
+    white_fit : Fit
         The refit with white noise.
     autocorrelation : dict of str to float
         Weights of the autocorrelation that it leaves.
-    was : dict of str to Excess
+    nominal_excess : dict of str to Excess
         What the nominal model leaves of the recordings to fit, by block.
-    start : Candidate
+    start : FittedHypothesis
         The refitted baseline as a hypothesis.
-    apart : list of Block
+    held_out_alone : list of Block
         Blocks whose excess the held-out recordings alone show.
-    before : dict
+    nominal_residuals : dict
         What the nominal model leaves of the recordings to fit.
     error : (dict, dict)
         Noise levels with the error of the model that is taken for usual, and how large it is in
@@ -278,12 +286,12 @@ class _Refit:
     """
 
     trial: Attempts
-    first: Fit
+    white_fit: Fit
     autocorrelation: dict[str, float]
-    was: dict[str, Excess]
-    start: Candidate
-    apart: list[Block]
-    before: dict[Key, Residual]
+    nominal_excess: dict[str, Excess]
+    start: FittedHypothesis
+    held_out_alone: list[Block]
+    nominal_residuals: dict[Key, Residual]
     error: tuple[dict[Key, NoiseLevel], dict[str, float]]
 
     @property
@@ -291,35 +299,37 @@ class _Refit:
         """True where the size of the model's error is stated: by the rig file, or as none."""
         return _error_is_given(self.trial.nominal, self.trial.settings)
 
-    def beside_less(self, candidates: list[Candidate]) -> _Refit | None:
+    def with_smaller_error(self, candidates: list[FittedHypothesis]) -> _Refit | None:
         """Refit with the smaller error that the likeliest hypothesis leaves the model, or None."""
         trial, (usual, sizes) = self.trial, self.error
         each = [(c, *error_sizes(trial.inner, c.fit.residuals, usual)) for c in candidates]
-        _, left, _ = max(each, key=lambda one: one[2] - _price(one[0], trial))
-        if all(left[name] > _CLEARLY_LESS * size for name, size in sizes.items()):
+        _, sizes_left, _ = max(each, key=lambda one: one[2] - _price(one[0], trial))
+        if all(sizes_left[name] > _CLEARLY_LESS * size for name, size in sizes.items()):
             return None
-        return self.beside({name: min(size, left[name]) for name, size in sizes.items()})
+        return self.with_error_sizes(
+            {name: min(size, sizes_left[name]) for name, size in sizes.items()}
+        )
 
-    def beside(self, sizes: dict[str, float]) -> _Refit | None:
+    def with_error_sizes(self, sizes: dict[str, float]) -> _Refit | None:
         """Refit with other sizes of the model's error; None where these leave no mismatch."""
         trial = self.trial
-        own = trial.inner, trial.outer, trial.nominal, self.first, self.before
-        found = _kept(*own, (self.error[0], sizes), same=trial.same)
-        return found if found.trial.suspects else None
+        inputs = trial.inner, trial.outer, trial.nominal, self.white_fit, self.nominal_residuals
+        refit = _refit_with_error_sizes(*inputs, (self.error[0], sizes), same=trial.same)
+        return refit if refit.trial.suspects else None
 
     def group(
         self,
-        candidates: list[Candidate],
+        candidates: list[FittedHypothesis],
         probabilities: dict[Hypothesis, float],
         mismatch: Block | None,
     ) -> BlockGroup:
         """The blocks as a group, with hypotheses and their probabilities."""
         trial = self.trial
-        blocks, kept = trial.inner.blocks, candidates[0].fitted
+        blocks, fitted_excess = trial.inner.blocks, candidates[0].fitted
         return BlockGroup(
             blocks,
-            self.was,
-            kept,
+            self.nominal_excess,
+            fitted_excess,
             candidates,
             probabilities,
             mismatch,
@@ -331,16 +341,18 @@ class _Refit:
 def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refit:
     """Fit parameters inside their tolerances, and find what each block keeps."""
     blocks, settings = inner.blocks, inner.settings
-    before = residuals(inner, nominal)
-    first = refitted(inner, nominal, without_autocorrelation(blocks))
+    nominal_residuals = residuals(inner, nominal)
+    white_fit = refitted(inner, nominal, without_autocorrelation(blocks))
     stated = model_error(nominal, settings.usual_error)
-    noise_level = noise_levels(inner, core_rig(first.rig, inner.core), stated)
+    noise_level = noise_levels(inner, core_rig(white_fit.rig, inner.core), stated)
     if not same:
-        noise_level |= noise_levels(outer, core_rig(first.rig, outer.core), stated)
+        noise_level |= noise_levels(outer, core_rig(white_fit.rig, outer.core), stated)
     usual, sizes = noise_level, dict.fromkeys((b.name for b in blocks), 1.0)
     if not _error_is_given(nominal, settings):
-        sizes, _ = error_sizes(inner, first.residuals, usual)
-    return _kept(inner, outer, nominal, first, before, (usual, sizes), same=same)
+        sizes, _ = error_sizes(inner, white_fit.residuals, usual)
+    return _refit_with_error_sizes(
+        inner, outer, nominal, white_fit, nominal_residuals, (usual, sizes), same=same
+    )
 
 
 def _error_is_given(nominal: Rig, settings: DiagnosisSettings) -> bool:
@@ -348,12 +360,12 @@ def _error_is_given(nominal: Rig, settings: DiagnosisSettings) -> bool:
     return bool(nominal.model_error) or not settings.usual_error
 
 
-def _kept(
+def _refit_with_error_sizes(
     inner: Problem,
     outer: Problem,
     nominal: Rig,
-    first: Fit,
-    before: dict[Key, Residual],
+    white_fit: Fit,
+    nominal_residuals: dict[Key, Residual],
     error: tuple[dict[Key, NoiseLevel], dict[str, float]],
     *,
     same: bool,
@@ -363,43 +375,55 @@ def _kept(
     """
     blocks, settings = inner.blocks, inner.settings
     noise_level = with_sizes(*error)
-    baseline, autocorrelation = with_autocorrelation(inner, nominal, first, noise_level)
+    baseline, autocorrelation = with_autocorrelation(inner, nominal, white_fit, noise_level)
 
-    def kept(problem: Problem, found: dict[Key, Residual]) -> dict[str, Excess]:
-        return {b.name: excess(b, problem.recordings, found, noise_level, settings) for b in blocks}
+    def excess_by_block(
+        problem: Problem, block_residuals: dict[Key, Residual]
+    ) -> dict[str, Excess]:
+        return {
+            b.name: excess(b, problem.recordings, block_residuals, noise_level, settings)
+            for b in blocks
+        }
 
-    was, now = kept(inner, before), kept(inner, baseline.residuals)
+    nominal_excess, fitted_excess = (
+        excess_by_block(inner, nominal_residuals),
+        excess_by_block(inner, baseline.residuals),
+    )
     outside = (
         predicted_by_others(inner, baseline, autocorrelation)
         if same
         else residuals(outer, baseline.rig)
     )
-    out = kept(outer, outside)
+    held_out_excess = excess_by_block(outer, outside)
     # what parameters could not be told from the fitted recordings shows in the others alone, and is
     # no mismatch
 
-    def held_out_alone(found: dict[str, Excess]) -> list[Block]:
+    def held_out_alone(excesses: dict[str, Excess]) -> list[Block]:
         return [
             b
             for b in blocks
-            if significant(found[b.name], _HELD_OUT_RATIO)
-            and now[b.name].ratio > _FITTED_HINT
+            if significant(excesses[b.name], _HELD_OUT_RATIO)
+            and fitted_excess[b.name].ratio > _FITTED_HINT
             and not same
         ]
 
-    apart = held_out_alone(out)
-    if misses_only_held_out(now, out, same=same):
+    apart = held_out_alone(held_out_excess)
+    if misses_only_held_out(fitted_excess, held_out_excess, same=same):
         outside = predicted_with_doubt(outer, baseline)
-        out = kept(outer, outside)
-    there = held_out_alone(out)
-    suspects = [b for b in blocks if significant(now[b.name]) or b in there]
-    trial = Attempts(inner, outer, nominal, noise_level, out, suspects)
-    told = trial.likelihood_of(baseline.residuals, outside)
-    start = Candidate((), baseline, out, now, 0.0, likelihood=told)
-    return _Refit(trial, first, autocorrelation, was, start, apart, before, error)
+        held_out_excess = excess_by_block(outer, outside)
+    apart_with_doubt = held_out_alone(held_out_excess)
+    suspects = [b for b in blocks if significant(fitted_excess[b.name]) or b in apart_with_doubt]
+    trial = Attempts(inner, outer, nominal, noise_level, held_out_excess, suspects)
+    likelihood = trial.likelihood_of(baseline.residuals, outside)
+    start = FittedHypothesis(
+        (), baseline, held_out_excess, fitted_excess, 0.0, likelihood=likelihood
+    )
+    return _Refit(
+        trial, white_fit, autocorrelation, nominal_excess, start, apart, nominal_residuals, error
+    )
 
 
-def _price(candidate: Candidate, trial: Attempts) -> float:
+def _price(candidate: FittedHypothesis, trial: Attempts) -> float:
     """Log odds that the parameters of a hypothesis cost: their moves, and for each the half
     logarithm of the number of bins (Schwarz), which it could have fitted by chance.
     """
@@ -413,13 +437,15 @@ def _price(candidate: Candidate, trial: Attempts) -> float:
     return 0.5 * (moved + count * math.log(bins)) + terms
 
 
-def _healthy_group(refit: _Refit, common: Candidate) -> BlockGroup:
+def _healthy_group(refit: _Refit, common: FittedHypothesis) -> BlockGroup:
     """Group whose baseline, fitted to all recordings, leaves only noise in them."""
     trial = refit.trial
     # what the nominal model leaves in the held-out ones is what the parameters are moved for
     quiet = residuals(trial.outer, trial.nominal)
     ever = {
-        b.name: max(refit.was[b.name], trial.excess(b, trial.outer, quiet), key=lambda e: e.ratio)
+        b.name: max(
+            refit.nominal_excess[b.name], trial.excess(b, trial.outer, quiet), key=lambda e: e.ratio
+        )
         for b in trial.inner.blocks
     }
     return replace(refit.group([common], {UNDECIDED: 1.0}, None), nominal=ever, suspects=[])
@@ -434,34 +460,34 @@ def _acting_effects(trial: Attempts) -> list[Term]:
     return [term for term in terms if any(acts_in(term, b) for b in trial.suspects)]
 
 
-def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
+def _refit_with_smaller_model_error(refit: _Refit, tell: Say) -> _Refit | None:
     """Refit with a smaller model error where that and an effect are more probable than the usual
     error and none; else None.
     """
     sizes = refit.error[1]
     if refit.error_is_given or max(sizes.values()) <= LEAST_SIZE:
         return None
-    least = refit.beside(dict.fromkeys(sizes, LEAST_SIZE))
+    least = refit.with_error_sizes(dict.fromkeys(sizes, LEAST_SIZE))
     if least is None:
         return None
-    work = _begun(least, tell)
+    state = _screen_mismatch(least, tell)
     # a few steps show whether the error is smaller beside an effect, which is then fitted anew
-    screened = work.search.screened
+    screened = state.search.screened
     starts = [
         start
         for scores in by_effect(screened.scores()).values()
-        if _is_worth(screened, scores)
+        if _is_worth_fitting(screened, scores)
         for start in _scaled_starts(best_of_each_kind(scores))
     ]
-    baseline = work.search.start.fit
-    tried = two_at_a_time(lambda start: least.trial.fit_shortly([start], baseline), starts)
-    events = _fit_events(work.search, [*work.own, *work.transient])
-    singles = [*(c for c in tried if c is not None), *events, *work.mistaken]
-    return refit.beside_less([refit.start, *singles])
+    baseline = state.search.start.fit
+    short_fits = two_at_a_time(lambda start: least.trial.fit_shortly([start], baseline), starts)
+    events = _fit_events(state.search, [*state.per_recording, *state.transient])
+    singles = [*(c for c in short_fits if c is not None), *events, *state.mistaken]
+    return refit.with_smaller_error([refit.start, *singles])
 
 
 @dataclass(frozen=True, eq=False)
-class _Begun:
+class _SearchState:
     """Screened mismatch, from which hypotheses are fitted.
 
     Attributes
@@ -470,45 +496,45 @@ class _Begun:
         Screen and weights.
     mismatch : Block
         The block that keeps most.
-    mistaken : list of Candidate
+    mistaken : list of FittedHypothesis
         Values that may be wrong.
-    own, transient : list of Term
+    per_recording, transient : list of Term
         Effects with sizes, and with times, of their own in each recording.
     """
 
     search: Search
     mismatch: Block
-    mistaken: list[Candidate]
-    own: list[Term]
+    mistaken: list[FittedHypothesis]
+    per_recording: list[Term]
     transient: list[Term]
 
 
-def _tried(refit: _Refit, tell: Say) -> Mismatch:
+def _fit_hypotheses(refit: _Refit, tell: Say) -> Mismatch:
     """Mismatch with every hypothesis that was tried for it, at one size of the model's error."""
-    work = _begun(refit, tell)
-    candidates = _fit_hypotheses(work.search, work.mistaken, work.own, work.transient)
-    candidates, weighed = _weigh_to_the_end(work.search, candidates)
-    return Mismatch(refit, work.mismatch, work.search, candidates, weighed)
+    state = _screen_mismatch(refit, tell)
+    candidates = _fit_candidates(state.search, state.mistaken, state.per_recording, state.transient)
+    candidates, weighed = _weigh_to_the_end(state.search, candidates)
+    return Mismatch(refit, state.mismatch, state.search, candidates, weighed)
 
 
-def _begun(refit: _Refit, tell: Say) -> _Begun:
+def _screen_mismatch(refit: _Refit, tell: Say) -> _SearchState:
     """Screen a mismatch, and fit values that may be wrong."""
     trial, start = refit.trial, refit.start
     suspects, now = trial.suspects, start.fitted
-    mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
+    mismatch = max(suspects, key=lambda b: trial.held_out[b.name].ratio + now[b.name].ratio)
     size = f"{now[mismatch.name].systematic:.2g} noise levels"
-    tell(Line(f"after the refit the residual of {mismatch.name} is {size}", _REFITTED))
+    tell(Line(f"after the refit the residual of {mismatch.name} is {size}", _REFIT_SHARE))
     acting = _acting_effects(trial)
     # events of free times would always mend a noise level that was estimated too low
-    happens = [e for e in acting if not e.at and e.info.transient and not e.info.own]
-    transient = [] if _is_marginal(refit) else happens
+    transient_everywhere = [e for e in acting if not e.at and e.info.transient and not e.info.own]
+    transient = [] if _is_marginal(refit) else transient_everywhere
     # gauges do not drift together
-    own = [e for e in acting if e.info.own and (e.at or len(trial.terms_of(e.id)) == 1)]
+    per_recording = [e for e in acting if e.info.own and (e.at or len(trial.terms_of(e.id)) == 1)]
     persistent = [e for e in acting if e.info.lasting]
     part = trial.inner.losses.part
     mistaken = part(
         "the search for wrong values",
-        lambda: free_suspects(trial, start.fit, refit.first, tell),
+        lambda: free_suspects(trial, start.fit, refit.white_fit, tell),
         [],
     )
     sealed = trial.nominal.model["valve"] is None
@@ -521,7 +547,7 @@ def _begun(refit: _Refit, tell: Say) -> _Begun:
         trial.settings,
     )
     search = Search(trial, screened, start, weighing, tell)
-    return _Begun(search, mismatch, mistaken, own, transient)
+    return _SearchState(search, mismatch, mistaken, per_recording, transient)
 
 
 @dataclass(frozen=True, eq=False)
@@ -536,7 +562,7 @@ class Mismatch:
         The one that keeps most.
     search : Search
         What hypotheses were found with, and are weighed by.
-    candidates : list of Candidate
+    candidates : list of FittedHypothesis
         The baseline first, then every hypothesis.
     weighed : dict of Hypothesis to float
         Their probabilities.
@@ -545,7 +571,7 @@ class Mismatch:
     refit: _Refit
     block: Block
     search: Search
-    candidates: list[Candidate]
+    candidates: list[FittedHypothesis]
     weighed: dict[Hypothesis, float]
 
     @property
@@ -573,16 +599,16 @@ class Mismatch:
         )
         named = [c for c in self.candidates if c.effects and c.fit.events is None]
         best = max(named, key=lambda c: _probability(self.weighed, c), default=None)
-        found: list[Candidate] = []
+        fitted: list[FittedHypothesis] = []
         for one in starts:
             alone = trial.fit_effects([one], start.fit, trial.white)
             if alone is None or not _is_visible(alone, one):
                 continue  # a clock that is late by the same for all that a block sees
-            found.append(alone)
+            fitted.append(alone)
             if best is not None and not one.effect.excluded_by(best.effects):
                 both = trial.fit_together([*trial.starts_of(best), one], best.fit, best.wrong)
-                found += [] if both is None else [both]
-        candidates = _best_of_each([*self.candidates, *found])
+                fitted += [] if both is None else [both]
+        candidates = _best_of_each([*self.candidates, *fitted])
         candidates, weighed = _weigh_to_the_end(self.search, candidates)
         return replace(self, candidates=candidates, weighed=weighed)
 
@@ -624,14 +650,14 @@ class OnlyNoise:
         The baseline.
     tell : callable
         Receives progress.
-    shared : list of Candidate
+    shared : list of FittedHypothesis
         Effects that other blocks have, with the values that they have there.
     """
 
     refit: _Refit
     group: BlockGroup
     tell: Say
-    shared: list[Candidate] = field(default_factory=list)
+    shared: list[FittedHypothesis] = field(default_factory=list)
 
     def with_effects_of_others(self, starts: list[Start]) -> OnlyNoise:
         """Group after the effects that other blocks name were tried here: one is there where
@@ -642,17 +668,17 @@ class OnlyNoise:
         baseline = self.group.candidates[0]
         if baseline is not self.refit.start:
             return self  # one fit of all recordings: no hypothesis is compared with it
-        found = []
+        consistent = []
         for start in starts:
             # held first: what the baseline hid it by has to let go of it
             known = replace(start, free={}, held=start.held | start.free)
             first = trial.fit_effects([known], baseline.fit, trial.white)
             both = first and trial.fit_effects([start], first.fit, trial.white)
             if both and _is_visible(both, start):
-                own = both.fit
-                alike = (are_alike(own.values[n], v, own.std[n]) for n, v in start.free.items())
-                found += [both] if all(alike) else []
-        return replace(self, shared=_best_of_each(found))
+                joint = both.fit
+                alike = (are_alike(joint.values[n], v, joint.std[n]) for n, v in start.free.items())
+                consistent += [both] if all(alike) else []
+        return replace(self, shared=_best_of_each(consistent))
 
     def groups(self, _: Say) -> list[BlockGroup]:
         """The blocks as one group, with values that the file may be wrong about, and with effects
@@ -661,9 +687,9 @@ class OnlyNoise:
         baseline, refit = self.group.candidates[0], self.refit
         if baseline is not refit.start:
             return [self.group]
-        own = all(is_unlikely(c.fit) for c in (baseline, *self.shared))
+        with_effects = all(is_unlikely(c.fit) for c in (baseline, *self.shared))
         whole = replace(refit, trial=replace(refit.trial, suspects=self.group.blocks))
-        work = partial(_behind_values, whole, self.tell, effects=own)
+        work = partial(_find_hidden_by_values, whole, self.tell, effects=with_effects)
         what = "the search for what moved values explain"
         prices = refit.trial.inner.losses.part(what, work, {})
         # what is there once is paid for once: the odds of both places are given for both
@@ -678,35 +704,38 @@ def _leading(weighed: Mapping[Hypothesis, float]) -> Hypothesis:
 
 def _is_marginal(refit: _Refit) -> bool:
     """True where so little is left that the noise level may as well have been estimated too low."""
-    found = (refit.start.fitted, refit.trial.out)
+    excesses = (refit.start.fitted, refit.trial.held_out)
     return all(
         e.ratio - 1.0 < max(_MARGINAL_MULTIPLE * (e.limit - 1.0), _MARGINAL_EXCESS)
         for b in refit.trial.suspects
-        for e in (kept[b.name] for kept in found)
+        for e in (excess_by_block[b.name] for excess_by_block in excesses)
     )
 
 
-def _best_of_each(candidates: list[Candidate]) -> list[Candidate]:
+def _best_of_each(candidates: list[FittedHypothesis]) -> list[FittedHypothesis]:
     """Candidate of each hypothesis that leaves least."""
-    best: dict[Hypothesis, Candidate] = {}
+    best: dict[Hypothesis, FittedHypothesis] = {}
     for candidate in sorted(candidates, key=log_misfit):
         best.setdefault(candidate.hypothesis, candidate)
     return [c for c in candidates if c is best[c.hypothesis]]
 
 
-def _fit_hypotheses(
-    search: Search, mistaken: list[Candidate], own: list[Term], transient: list[Term]
-) -> list[Candidate]:
+def _fit_candidates(
+    search: Search,
+    mistaken: list[FittedHypothesis],
+    per_recording: list[Term],
+    transient: list[Term],
+) -> list[FittedHypothesis]:
     """The baseline, single effects, pairs where no single one explains the mismatch, and values
-    that are wrong. ``own`` and ``transient`` are effects with sizes, and with times, of their own
-    in each recording.
+    that are wrong. ``per_recording`` and ``transient`` are effects with sizes, and with times, of
+    their own in each recording.
     """
     trial, start, alone = search.trial, search.start, search.weight
     singles = _fit_singles(search)
     part = trial.inner.losses.part
     what = "the effects that are the same data as others"
     singles = part(what, lambda: _add_same_data(search, singles), singles)
-    singles += _fit_events(search, own)
+    singles += _fit_events(search, per_recording)
     if transient and not any(cannot_gain(c, trial) for c in (*singles, *mistaken)):
         search.tell(
             f"looking for what happens at times of its own ({', '.join(map(str, transient))})"
@@ -716,25 +745,25 @@ def _fit_hypotheses(
     if any(settles(c, trial, start) for c in (*singles, *mistaken)):
         lasting = sorted((c for c in singles if c.fit.events is None), key=log_misfit)
 
-        def more() -> list[Candidate]:
+        def more() -> list[FittedHypothesis]:
             near = _nearly_as_heavy(lasting, alone)
             return [s for c in near for s in with_freed_values(search, c)]
     else:
         more = partial(combine, search, singles, mistaken, transient)
     sets = part("the search for sets of names", more, [])
-    asked = part("what was asked for", lambda: fit_considered(search), [])
-    return [start, *_best_of_each([*singles, *sets, *mistaken, *asked])]
+    considered = part("what was asked for", lambda: fit_considered(search), [])
+    return [start, *_best_of_each([*singles, *sets, *mistaken, *considered])]
 
 
-def _fit_events(search: Search, effects: list[Term]) -> list[Candidate]:
+def _fit_events(search: Search, effects: list[Term]) -> list[FittedHypothesis]:
     """Effects with sizes or times of their own in each recording, each by itself."""
-    tried = (search.trial.fit_events(effect, search.start) for effect in effects)
-    return [c for c in tried if c is not None]
+    candidates = (search.trial.fit_events(effect, search.start) for effect in effects)
+    return [c for c in candidates if c is not None]
 
 
 def _nearly_as_heavy(
-    lasting: list[Candidate], weight: Callable[[Candidate], float]
-) -> list[Candidate]:
+    lasting: list[FittedHypothesis], weight: Callable[[FittedHypothesis], float]
+) -> list[FittedHypothesis]:
     """Best of the lasting effects, and its close runners-up by weight."""
     top = max(map(weight, lasting), default=0.0)
     near = [c for c in lasting[1:] if math.exp(weight(c) - top) > _POLISH_FROM]
@@ -742,30 +771,30 @@ def _nearly_as_heavy(
     return [*lasting[:1], *near[: max(MOST_PAIRED - 1, 0)]]
 
 
-def _is_visible(candidate: Candidate, start: Start) -> bool:
+def _is_visible(candidate: FittedHypothesis, start: Start) -> bool:
     """True where recordings depend on any parameter of an effect that was fitted."""
     return any(math.isfinite(candidate.fit.std[name]) for name in start.free)
 
 
 def _weigh_to_the_end(
-    search: Search, candidates: list[Candidate]
-) -> tuple[list[Candidate], dict[Hypothesis, float]]:
+    search: Search, candidates: list[FittedHypothesis]
+) -> tuple[list[FittedHypothesis], dict[Hypothesis, float]]:
     """Hypotheses with their probabilities, those that are close fitted to the end first."""
     start, trial, settings = candidates[0], search.trial, search.trial.settings
 
-    def weights(sets: list[Candidate]) -> dict[Hypothesis, float]:
+    def weights(sets: list[FittedHypothesis]) -> dict[Hypothesis, float]:
         return weigh(sets, trial.compared, search.weighing)
 
-    found = weights(candidates)
-    likely = [c for c in candidates[1:] if _probability(found, c) > _POLISH_FROM]
-    close = sorted(likely, key=lambda c: -_probability(found, c))[: settings.most_polished]
+    probabilities = weights(candidates)
+    likely = [c for c in candidates[1:] if _probability(probabilities, c) > _POLISH_FROM]
+    close = sorted(likely, key=lambda c: -_probability(probabilities, c))[: settings.most_polished]
     if len(close) > 1 or (close and not explains(close[0], start, trial.compared)):
         search.tell("fitting to the end " + ", ".join(str(c.hypothesis) for c in close))
-        ended = [trial.polish(c) if c in close else c for c in candidates]
+        polished = [trial.polish(c) if c in close else c for c in candidates]
         # what came back inside its tolerances on the way to the end is not wrong
-        candidates = [c for c in ended if c.is_wrong(settings.most_tolerances)]
-        found = weights(candidates)
-    return candidates, found
+        candidates = [c for c in polished if c.is_wrong(settings.most_tolerances)]
+        probabilities = weights(candidates)
+    return candidates, probabilities
 
 
 def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGroup:
@@ -819,22 +848,22 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
     }
 
     def weighed(blocks: list[Block]) -> dict[Hypothesis, float]:
-        there = [c for c in acting if any(b in blocks for b in acting[c])]
-        return weigh([start, *there], blocks, weighing)
+        candidates = [c for c in acting if any(b in blocks for b in acting[c])]
+        return weigh([start, *candidates], blocks, weighing)
 
-    own = {
+    alone = {
         b.name: weighed([b])
         for b in group.suspects
-        if any(found == [b] for found in acting.values())
+        if any(acted_on == [b] for acted_on in acting.values())
     }
-    named = [b for b in group.suspects if b.name in own and _leading(own[b.name]).terms]
+    named = [b for b in group.suspects if b.name in alone and _leading(alone[b.name]).terms]
     rest = [b for b in group.suspects if b not in named]
     if not named:
         return []
     best = [
         max(
-            (c for c in acting if c.hypothesis in own[b.name]),
-            key=partial(_probability, own[b.name]),
+            (c for c in acting if c.hypothesis in alone[b.name]),
+            key=partial(_probability, alone[b.name]),
         )
         for b in named
     ]
@@ -869,7 +898,7 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
             },
         )
 
-    parts = [part([b], [b], own[b.name]) for b in named]
+    parts = [part([b], [b], alone[b.name]) for b in named]
     others = [b for b in group.blocks if b not in named]
     if rest:
         return [*parts, part(others, rest, weighed(rest))]
@@ -877,31 +906,31 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
     return [replace(parts[0], blocks=[*named[:1], *others]), *parts[1:]]
 
 
-def _probability(weighed: dict[Hypothesis, float], candidate: Candidate) -> float:
+def _probability(weighed: dict[Hypothesis, float], candidate: FittedHypothesis) -> float:
     """Probability of a hypothesis."""
     return weighed.get(candidate.hypothesis, 0.0)
 
 
-def _fit_all_recordings(trial: Attempts, start: Candidate) -> Candidate | None:
+def _fit_all_recordings(trial: Attempts, start: FittedHypothesis) -> FittedHypothesis | None:
     """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings,
     taken together, if there is one.
     """
     inner, outer = trial.inner, trial.outer
     both = replace(inner, recordings=[*inner.recordings, *outer.recordings])
     try:
-        found = thorough(both, trial.nominal, trial.white, start.fit)
+        common = thorough(both, trial.nominal, trial.white, start.fit)
     except SimulationError:
         return None
-    fitted, held = (
-        {b.name: trial.excess(b, part, found.residuals) for b in inner.blocks}
+    fitted, held_out = (
+        {b.name: trial.excess(b, part, common.residuals) for b in inner.blocks}
         for part in (inner, outer)
     )
-    if any(significant(e[b.name]) for b in inner.blocks for e in (fitted, held)):
+    if any(significant(e[b.name]) for b in inner.blocks for e in (fitted, held_out)):
         return None
-    return Candidate((), found, held, fitted, 0.0)
+    return FittedHypothesis((), common, held_out, fitted, 0.0)
 
 
-def _fit_singles(search: Search) -> list[Candidate]:
+def _fit_singles(search: Search) -> list[FittedHypothesis]:
     """The effects that the screen finds worth it, fitted; the most telling first."""
     trial, screened, baseline = search.trial, search.screened, search.start.fit
     settings = trial.settings
@@ -909,9 +938,11 @@ def _fit_singles(search: Search) -> list[Candidate]:
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
     least = max(LEAST_GAIN, _LEAST_GAIN_SHARE * most)
-    worth = _by_family([e for e, scores in ranked.items() if _is_worth(screened, scores, least)])
+    worth = _by_family(
+        [e for e, scores in ranked.items() if _is_worth_fitting(screened, scores, least)]
+    )
     first = ", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8])
-    search.tell(Line(f"screened: {first or 'no effect acts here'}", _SCREENED))
+    search.tell(Line(f"screened: {first or 'no effect acts here'}", _SCREEN_SHARE))
 
     if screened.strong:
         chosen, near, short = _shortlist(search, worth, ranked)
@@ -926,37 +957,37 @@ def _fit_singles(search: Search) -> list[Candidate]:
                 near[effect] = _scaled_starts(
                     _near_starts(ranked[effect]) if leads else ranked[effect][:1]
                 )
-    found = []
+    singles = []
     for effect in chosen:
-        tried = two_at_a_time(
+        attempts = two_at_a_time(
             lambda start: _fit_effect(
                 trial, start, baseline, short.get((start.effect, start.form))
             ),
             near[effect],
         )
-        fitted = [candidate for candidate in tried if candidate is not None]
+        fitted = [candidate for candidate in attempts if candidate is not None]
         if fitted:
-            found.append(
+            singles.append(
                 replace(_first_of_equal_forms(fitted, FORM_SHARE_ALIKE), gain=gains[effect])
             )
-    return found
+    return singles
 
 
 def _fit_effect(
-    trial: Attempts, start: Start, baseline: Fit, short: Candidate | None
-) -> Candidate | None:
+    trial: Attempts, start: Start, baseline: Fit, short: FittedHypothesis | None
+) -> FittedHypothesis | None:
     """Fit an effect from a start with the baseline; where a few steps to the same start had left
     less, from where these had moved the baseline too.
     """
-    found = trial.fit_effects([start], baseline, trial.white)
-    if short is None or (found is not None and found.misfit <= short.misfit):
-        return found
-    again = trial.fit_effects([start], short.fit, trial.white)
-    both = [c for c in (found, again) if c is not None]
+    direct = trial.fit_effects([start], baseline, trial.white)
+    if short is None or (direct is not None and direct.misfit <= short.misfit):
+        return direct
+    from_short = trial.fit_effects([start], short.fit, trial.white)
+    both = [c for c in (direct, from_short) if c is not None]
     return min(both, key=lambda c: c.misfit, default=None)
 
 
-def _is_worth(screened: Screen, scores: list[Score], least: float = LEAST_GAIN) -> bool:
+def _is_worth_fitting(screened: Screen, scores: list[Score], least: float = LEAST_GAIN) -> bool:
     """True where an effect is worth a fit: of a strong mismatch each effect is."""
     return screened.strong or scores[0].gain > least
 
@@ -968,7 +999,7 @@ def _scaled_starts(scores: Iterable[Score]) -> list[Start]:
 
 def _shortlist(
     search: Search, worth: list[list[Term]], ranked: dict[Term, list[Score]]
-) -> tuple[list[Term], dict[Term, list[Start]], dict[tuple[Term, str], Candidate]]:
+) -> tuple[list[Term], dict[Term, list[Start]], dict[tuple[Term, str], FittedHypothesis]]:
     """Effects, of many (each a list of its places), that leave least after a few steps; starts to
     which the best of these steps led, and the candidates there, by effect and form.
 
@@ -979,14 +1010,14 @@ def _shortlist(
     """
     trial, weight, baseline = search.trial, search.weight, search.start.fit
     settings = trial.settings
-    short: dict[Term, list[Candidate]] = {}
+    short: dict[Term, list[FittedHypothesis]] = {}
 
     def begin(starts: dict[Term, list[Start]]) -> None:
-        tasks = [(e, start) for e, own in starts.items() for start in own]
-        tried = two_at_a_time(lambda one: trial.fit_shortly([one[1]], baseline), tasks)
+        tasks = [(e, start) for e, of_effect in starts.items() for start in of_effect]
+        short_fits = two_at_a_time(lambda one: trial.fit_shortly([one[1]], baseline), tasks)
         for effect in starts:
-            own = [c for (e, _), c in zip(tasks, tried, strict=True) if e == effect]
-            known = [*short.get(effect, []), *(c for c in own if c is not None)]
+            of_effect = [c for (e, _), c in zip(tasks, short_fits, strict=True) if e == effect]
+            known = [*short.get(effect, []), *(c for c in of_effect if c is not None)]
             short[effect] = sorted(known, key=weight, reverse=True)
 
     def most(effect: Term) -> float:
@@ -995,9 +1026,13 @@ def _shortlist(
     best_of = {places[0]: best_of_each_kind(ranked[places[0]]) for places in worth}
     begin({effect: _scaled_starts(best) for effect, best in best_of.items()})
     walls = settings.most_tolerances
-    absent = {e for e, own in short.items() if own and all(is_absent(c, walls) for c in own)}
-    there = [places for places in worth if places[0] not in absent]
-    first = sorted(there, key=lambda places: -most(places[0]))[: settings.most_singles]
+    absent = {
+        e
+        for e, of_effect in short.items()
+        if of_effect and all(is_absent(c, walls) for c in of_effect)
+    }
+    present = [places for places in worth if places[0] not in absent]
+    first = sorted(present, key=lambda places: -most(places[0]))[: settings.most_singles]
     begin(
         {p[0]: _scaled_starts(s for s in ranked[p[0]] if s not in best_of[p[0]]) for p in first}
         | {
@@ -1009,31 +1044,33 @@ def _shortlist(
     first.sort(key=lambda places: -most(places[0]))
     best: list[Term] = []
     starts: dict[Term, list[Start]] = {}
-    ends: dict[tuple[Term, str], Candidate] = {}
+    ends: dict[tuple[Term, str], FittedHypothesis] = {}
     for rank, places in enumerate(first):
         leads = rank < _EFFECTS_WITH_STARTS
-        tried = [e for e in places[: None if leads else 1] if most(e) > -math.inf]
-        least = min((short[e][0].misfit for e in tried), default=math.inf) / NEAR_PLACE
-        for effect in sorted((e for e in tried if short[e][0].misfit <= least), key=most)[::-1]:
+        fitted_places = [e for e in places[: None if leads else 1] if most(e) > -math.inf]
+        least = min((short[e][0].misfit for e in fitted_places), default=math.inf) / NEAR_PLACE
+        for effect in sorted((e for e in fitted_places if short[e][0].misfit <= least), key=most)[
+            ::-1
+        ]:
             # of the leading effects every form may yet be the one that leaves least
             forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
-            kept = sorted(forms.values(), key=weight, reverse=True)
+            best_forms = sorted(forms.values(), key=weight, reverse=True)
             count = _MOST_FORMS if leads else 1
-            starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
-            ends |= {(effect, form_in(c.fit.rig, effect)): c for c in kept[:count]}
+            starts[effect] = [trial.start_of(c.fit, effect) for c in best_forms[:count]]
+            ends |= {(effect, form_in(c.fit.rig, effect)): c for c in best_forms[:count]}
             best.append(effect)
     return best, starts, ends
 
 
 def _by_family(terms: list[Term]) -> list[list[Term]]:
     """The places of each effect, in the order in which they come."""
-    found: dict[str, list[Term]] = {}
+    places: dict[str, list[Term]] = {}
     for term in terms:
-        found.setdefault(term.id, []).append(term)
-    return list(found.values())
+        places.setdefault(term.id, []).append(term)
+    return list(places.values())
 
 
-def _first_of_equal_forms(fitted: list[Candidate], alike: float) -> Candidate:
+def _first_of_equal_forms(fitted: list[FittedHypothesis], alike: float) -> FittedHypothesis:
     """Fit of an effect that leaves least; of forms that leave as little, the catalogue's first."""
     least = min(log_misfit(c) for c in fitted)
     near = [c for c in fitted if log_misfit(c) <= least + alike]
@@ -1056,48 +1093,52 @@ def _near_starts(scores: list[Score]) -> list[Score]:
     return [*near[:MOST_STARTS], *(s for s in forms if s not in near)]
 
 
-def _add_same_data(search: Search, singles: list[Candidate]) -> list[Candidate]:
+def _add_same_data(search: Search, singles: list[FittedHypothesis]) -> list[FittedHypothesis]:
     """Single effects, and for each that may leave the same data as another effect (a late clock and
     a dead time) that other one.
     """
     trial, start, left_by = search.trial, search.start, search.share_left
-    there = {c.effects: c for c in singles}
+    single_of = {c.effects: c for c in singles}
 
-    def wanted(effect: Term, own: Candidate) -> bool:
+    def wanted(effect: Term, shaped: FittedHypothesis) -> bool:
         """True where an effect was not fitted, or only in a form that leaves clearly more."""
-        fitted = there.get((effect,))
+        fitted = single_of.get((effect,))
         return fits(trial.nominal, effect.id) and (
-            fitted is None or left_by(fitted) > left_by(own) + FORM_SHARE_ALIKE
+            fitted is None or left_by(fitted) > left_by(shaped) + FORM_SHARE_ALIKE
         )
 
-    found: list[Candidate] = []
-    others: list[Candidate | None] = []
+    all_shaped: list[FittedHypothesis] = []
+    others: list[FittedHypothesis | None] = []
     for single in singles:
         (effect,) = single.effects
         same = same_data_in(trial.nominal, effect)
-        own = single if same is None else _in_shape(search, single, same)
-        found.append(own)
-        if same is not None and same_recordings(own, effect, search.weighing.seconds):
-            others += [_as_other(trial, start, own, same)] if wanted(Term(same.effect), own) else []
+        shaped = single if same is None else _in_shape(search, single, same)
+        all_shaped.append(shaped)
+        if same is not None and same_recordings(shaped, effect, search.weighing.seconds):
+            others += (
+                [_as_other(trial, start, shaped, same)] if wanted(Term(same.effect), shaped) else []
+            )
         twins = ((twin, same_data_in(trial.nominal, twin)) for twin in map(Term, CATALOGUE))
         others += [
-            _as_twin(trial, start, own, twin, same)
+            _as_twin(trial, start, shaped, twin, same)
             for twin, same in twins
-            if same is not None and Term(same.effect) == effect and wanted(twin, own)
+            if same is not None and Term(same.effect) == effect and wanted(twin, shaped)
         ]
-    return _best_of_each([*found, *(c for c in others if c is not None)])
+    return _best_of_each([*all_shaped, *(c for c in others if c is not None)])
 
 
-def _in_shape(search: Search, single: Candidate, same: SameData) -> Candidate:
+def _in_shape(search: Search, single: FittedHypothesis, same: SameData) -> FittedHypothesis:
     """An effect in the shape in which it is the same data as another one, where it explains as much
     in it.
     """
     trial = search.trial
-    own = trial.start_of(single.fit, single.effects[0])
-    held = {f"{own.effect}.{name}": value for name, value in same.held}
-    if all(own.held[name] == value for name, value in held.items()):
+    start = trial.start_of(single.fit, single.effects[0])
+    held = {f"{start.effect}.{name}": value for name, value in same.held}
+    if all(start.held[name] == value for name, value in held.items()):
         return single
-    alike = trial.fit_effects([replace(own, held=own.held | held)], search.start.fit, trial.white)
+    alike = trial.fit_effects(
+        [replace(start, held=start.held | held)], search.start.fit, trial.white
+    )
     if alike is None:
         return single
     shaped, free = map(search.share_left, (alike, single))
@@ -1105,11 +1146,11 @@ def _in_shape(search: Search, single: Candidate, same: SameData) -> Candidate:
 
 
 def _as_other(
-    trial: Attempts, start: Candidate, single: Candidate, same: SameData
-) -> Candidate | None:
+    trial: Attempts, start: FittedHypothesis, single: FittedHypothesis, same: SameData
+) -> FittedHypothesis | None:
     """The other effect, as large as this one, where the two leave the same recordings."""
-    own = EFFECTS[same.effect].form(same.form).parameters
-    usual = {f"{same.effect}.{p.name}": p.default for p in own}
+    parameters = EFFECTS[same.effect].form(same.form).parameters
+    usual = {f"{same.effect}.{p.name}": p.default for p in parameters}
     usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{single.effects[0]}.{same.size}"]
     return trial.fit_effects(
         [Start(Term(same.effect), usual, {}, (), False, same.form)], start.fit, trial.white
@@ -1117,8 +1158,8 @@ def _as_other(
 
 
 def _as_twin(
-    trial: Attempts, start: Candidate, single: Candidate, twin: Term, same: SameData
-) -> Candidate | None:
+    trial: Attempts, start: FittedHypothesis, single: FittedHypothesis, twin: Term, same: SameData
+) -> FittedHypothesis | None:
     """The effect that leaves the same recordings as this one, where this one has a size."""
     size = single.fit.values.get(f"{same.effect}.{same.parameter}", 0.0)
     if size <= 0.0:

@@ -141,7 +141,7 @@ class Reading:
             raw=turned(prepared.raw),
             noise=noise,
             steps={name: maps.get(name, 1.0) * step for name, step in prepared.steps.items()},
-            _begun={},
+            _start_states={},
         )
 
     def read(self, problem: Problem) -> Problem:
@@ -177,41 +177,41 @@ def find_misread(problem: Problem, nominal: Rig) -> Reading | None:
         was = refitted(problem, nominal, _white(problem))
     except SimulationError:
         return None
-    found = [_fit_reading(problem, nominal, was, reading) for reading in large]
+    fitted = [_fit_reading(problem, nominal, was, reading) for reading in large]
     if _power(problem, was) <= _SUSPECT:
-        found += [_fit_gain(problem, nominal, was, reading) for reading in small]
-    believed = [r for r in found if r is not None and r.fit is not None]
+        fitted += [_fit_gain(problem, nominal, was, reading) for reading in small]
+    believed = [r for r in fitted if r is not None and r.fit is not None]
     return min(believed, key=lambda r: r.fit.cost if r.fit else math.inf, default=None)
 
 
 def _worth_a_fit(problem: Problem, nominal: Rig, readings: Sequence[Reading]) -> list[Reading]:
     """Readings that take most of what one step of the parameters leaves, where that is much."""
     names = free_baseline(problem, nominal)
-    left = _linear(problem, nominal, names)
-    if left <= _SUSPECT:
+    least_left = _linear(problem, nominal, names)
+    if least_left <= _SUSPECT:
         return []
-    tried: list[tuple[float, Reading]] = []
+    powers: list[tuple[float, Reading]] = []
     for reading in readings:
-        own = reading.read(problem)
-        if _possible(own, nominal):
+        reread = reading.read(problem)
+        if _possible(reread, nominal):
             with suppress(SimulationError):
-                tried.append((_linear(own, nominal, names), reading))
-    tried.sort(key=lambda item: item[0])
-    worth = [r for power, r in tried if power - 1.0 <= _PROMISING * (left - 1.0)]
+                powers.append((_linear(reread, nominal, names), reading))
+    powers.sort(key=lambda item: item[0])
+    worth = [r for power, r in powers if power - 1.0 <= _PROMISING * (least_left - 1.0)]
     return worth[:_FITTED]
 
 
 def _fit_reading(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
     """A reading with its fit, where the recordings ask for it."""
-    own = reading.read(problem)
+    reread = reading.read(problem)
     try:
-        now = refitted(own, nominal, _white(problem))
+        now = refitted(reread, nominal, _white(problem))
     except SimulationError:
         return None
-    before, after = _power(problem, was), _power(own, now)
-    if after - 1.0 > _LEFT * (before - 1.0) or _spoils_a_block(problem, was, own, now):
+    before, after = _power(problem, was), _power(reread, now)
+    if after - 1.0 > _LEFT * (before - 1.0) or _spoils_a_block(problem, was, reread, now):
         return None
-    if not _free_is_listed(own, now, reading):
+    if not _free_is_listed(reread, now, reading):
         return None
     return replace(reading, before=before, after=after, fit=now, was=was)
 
@@ -224,13 +224,13 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     follow the factor. Beside physics that is missing it is not told.
     """
     settings = problem.settings
-    own = reading.read(problem)
+    reread = reading.read(problem)
     beyond = replace(reading, factors=tuple(factor**2 for factor in reading.factors)).read(problem)
     try:
-        now = thorough(own, nominal, _white(problem), was)
-        after = _power(own, now)
+        now = thorough(reread, nominal, _white(problem), was)
+        after = _power(reread, now)
         least = _CLEAR_STDS**2 * max(1.0, after)
-        if 2.0 * (was.cost - now.cost) < least or not _is_noise(own, now):
+        if 2.0 * (was.cost - now.cost) < least or not _is_noise(reread, now):
             return None
         far = thorough(beyond, nominal, _white(problem), now)
     except SimulationError:
@@ -251,32 +251,32 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     return replace(fits, gain=gain, std=gain * abs(step) * std)
 
 
-def _is_noise(problem: Problem, found: Fit) -> bool:
+def _is_noise(problem: Problem, fitted: Fit) -> bool:
     """True where a fit leaves no more than noise in any block."""
-    levels = noise_levels(problem, core_rig(found.rig))
-    own = [
-        excess(b, problem.recordings, found.residuals, levels, problem.settings)
+    levels = noise_levels(problem, core_rig(fitted.rig))
+    excesses = [
+        excess(b, problem.recordings, fitted.residuals, levels, problem.settings)
         for b in problem.blocks
     ]
-    return all(one.ratio <= one.limit for one in own)
+    return all(one.ratio <= one.limit for one in excesses)
 
 
 def _white(problem: Problem) -> dict[str, float]:
     return {block.name: 1.0 for block in problem.blocks}
 
 
-def _power(problem: Problem, found: Fit) -> float:
-    rows, _ = stacked(problem, found.residuals, found.inflation)
+def _power(problem: Problem, fitted: Fit) -> float:
+    rows, _ = stacked(problem, fitted.residuals, fitted.inflation)
     return float(rows @ rows) / max(1, rows.size)
 
 
-def _spoils_a_block(problem: Problem, was: Fit, own: Problem, now: Fit) -> bool:
+def _spoils_a_block(problem: Problem, was: Fit, reread: Problem, now: Fit) -> bool:
     """True where a reading clearly raises what any block leaves: the right unit does not, whatever
     physics is missing as well.
     """
     blocks = [[block] for block in problem.blocks]
     before = [_power(replace(problem, blocks=one), was) for one in blocks]
-    after = [_power(replace(own, blocks=one), now) for one in blocks]
+    after = [_power(replace(reread, blocks=one), now) for one in blocks]
     return any(b > _SUSPECT * max(1.0, a) for a, b in zip(before, after, strict=True))
 
 
@@ -298,7 +298,7 @@ def _linear(problem: Problem, rig: Rig, names: Sequence[str]) -> float:
     return square / max(1, rows.size)
 
 
-def _free_is_listed(problem: Problem, found: Fit, reading: Reading) -> bool:
+def _free_is_listed(problem: Problem, fitted: Fit, reading: Reading) -> bool:
     """True where a free factor (or offset), fitted with the parameters, would be that of the list;
     the problem is that of the reading.
     """
@@ -309,20 +309,20 @@ def _free_is_listed(problem: Problem, found: Fit, reading: Reading) -> bool:
     pairs = [(p, moved.of(p)) for p in problem.recordings]
     # in units of the noise that it has, or a free factor would make the noise larger
     other = replace(problem, recordings=[replace(m, noise=p.noise) for p, m in pairs])
-    names = list(found.values)
-    rows, slope = stacked(problem, residuals(problem, found.rig, names), found.inflation)
+    names = list(fitted.values)
+    rows, slope = stacked(problem, residuals(problem, fitted.rig, names), fitted.inflation)
     try:
-        there, _ = stacked(other, residuals(other, found.rig), found.inflation)
+        turned, _ = stacked(other, residuals(other, fitted.rig), fitted.inflation)
     except SimulationError:
         return False
-    if there.size != rows.size:
+    if turned.size != rows.size:
         return False
-    columns = [((there - rows) / step)[:, None]]
+    columns = [((turned - rows) / step)[:, None]]
     if slope is not None:
-        columns.append(slope * np.array([found.scales[name] for name in names]))
+        columns.append(slope * np.array([fitted.scales[name] for name in names]))
     design = np.concatenate(columns, axis=1)
     prior = np.diag([0.0] + [1.0] * (design.shape[1] - 1))
-    strain = np.array([0.0, *(found.moved[name] for name in names)][: design.shape[1]])
+    strain = np.array([0.0, *(fitted.moved[name] for name in names)][: design.shape[1]])
     inverse = np.linalg.pinv(design.T @ design + prior, hermitian=True)
     away = abs(float((inverse @ (design.T @ rows + prior @ strain))[0]))
     # what the model leaves besides is coloured, so as many numbers fewer, and other in each block
@@ -350,7 +350,7 @@ def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:
     used = list(
         dict.fromkeys(name for block in problem.blocks for name in (block.channel, *block.drives))
     )
-    said = {name: _said(problem, name) for name in used}
+    units_said = {name: _unit_said(problem, name) for name in used}
     sets = dict.fromkeys(
         [
             *((name,) for name in used),
@@ -365,22 +365,22 @@ def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:
         if len(kinds) > 1:
             continue
         unit = kinds.pop()
-        told = " and ".join(dict.fromkeys(said[name] for name in channels))
-        sizes = [_size(said[name]) for name in channels]
+        log_units = " and ".join(dict.fromkeys(units_said[name] for name in channels))
+        sizes = [_size(units_said[name]) for name in channels]
         for other in OTHERS.get(unit, ()):
             factors = tuple(_size(other) / size for size in sizes)
             if max(abs(math.log(factor)) for factor in factors) > 1e-6:
-                yield Reading(channels, told, other, factors)
+                yield Reading(channels, log_units, other, factors)
         if unit == "Pa":
             same = (1.0,) * len(channels)
             yield Reading(channels, "gauge", "absolute", same, -ambient)
             yield Reading(channels, "absolute", "gauge", same, ambient)
 
 
-def _said(problem: Problem, channel: str) -> str:
+def _unit_said(problem: Problem, channel: str) -> str:
     """The unit in which the log is said to have a channel; SI where it was read from none."""
-    told = (p.recording.said.get(channel, "") for p in problem.recordings)
-    unit = next((u for u in told if u), "")
+    units = (p.recording.said.get(channel, "") for p in problem.recordings)
+    unit = next((u for u in units if u), "")
     return unit or unit_of(channel)
 
 
@@ -400,15 +400,15 @@ def reading_errors(nominal: Rig, problem: Problem, reading: Reading) -> dict[str
         after = residuals(turned, reading.fit.rig)
     except SimulationError:
         return {}
-    found: dict[str, ChannelError] = {}
+    errors_of: dict[str, ChannelError] = {}
     for block in problem.blocks:
         keys = [(block.name, p.recording.name) for p in problem.recordings]
         noise = math.sqrt(float(np.mean([p.noise[block.channel] ** 2 for p in turned.recordings])))
         errors = [_rms([stage[key] for key in keys]) for stage in (before, refit, after)]
-        found[block.channel] = ChannelError(noise, *errors)
-    return found
+        errors_of[block.channel] = ChannelError(noise, *errors)
+    return errors_of
 
 
-def _rms(found: list[Residual]) -> float:
-    values = np.concatenate([r.value[r.rows] for r in found])
+def _rms(of_recordings: list[Residual]) -> float:
+    values = np.concatenate([r.value[r.rows] for r in of_recordings])
     return float(np.sqrt(np.mean(values**2))) if values.size else math.nan

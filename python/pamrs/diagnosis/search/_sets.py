@@ -13,7 +13,7 @@ import numpy as np
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     Attempts,
-    Candidate,
+    FittedHypothesis,
     Weighing,
     explains,
     log_weight,
@@ -66,7 +66,7 @@ class Search:
         Recordings, model, noise levels.
     screened : Screen
         Signatures of the effects.
-    start : Candidate
+    start : FittedHypothesis
         The refitted baseline.
     weighing : Weighing
         What they are weighed by.
@@ -76,23 +76,23 @@ class Search:
 
     trial: Attempts
     screened: Screen
-    start: Candidate
+    start: FittedHypothesis
     weighing: Weighing
     tell: Say
 
-    def weight(self, candidate: Candidate) -> float:
+    def weight(self, candidate: FittedHypothesis) -> float:
         """Logarithm of what a hypothesis weighs against others."""
         return log_weight(candidate, self.start, self.trial.compared, self.weighing)
 
-    def share_left(self, candidate: Candidate) -> float:
+    def share_left(self, candidate: FittedHypothesis) -> float:
         """Share of the mismatch that a hypothesis leaves."""
         return share_left(candidate, self.start, self.trial.compared)
 
-    def heaviest_first(self, candidates: Iterable[Candidate]) -> list[Candidate]:
+    def heaviest_first(self, candidates: Iterable[FittedHypothesis]) -> list[FittedHypothesis]:
         """Hypotheses in the order of their weight."""
         return sorted(candidates, key=self.weight, reverse=True)
 
-    def rank(self, base: Candidate) -> tuple[Tangent, dict[Term, list[Score]]]:
+    def rank(self, base: FittedHypothesis) -> tuple[Tangent, dict[Term, list[Score]]]:
         """The tangent space of a set, and the starts of each effect by what they would take of what
         the set leaves.
         """
@@ -101,8 +101,11 @@ class Search:
 
 
 def combine(
-    search: Search, singles: list[Candidate], mistaken: list[Candidate], transient: list[Term]
-) -> list[Candidate]:
+    search: Search,
+    singles: list[FittedHypothesis],
+    mistaken: list[FittedHypothesis],
+    transient: list[Term],
+) -> list[FittedHypothesis]:
     """Sets of two hypotheses and more, where no single one settles the mismatch.
 
     The best of the single ones get a partner: another effect, or a value that is wrong. The best of
@@ -113,14 +116,14 @@ def combine(
     ----------
     search : Search
         What they are found with.
-    singles, mistaken : list of Candidate
+    singles, mistaken : list of FittedHypothesis
         Single effects and values that are wrong, fitted by themselves.
     transient : list of Term
         Effects that happen at times of their own.
 
     Returns
     -------
-    list of Candidate
+    list of FittedHypothesis
     """
     roots = search.heaviest_first(c for c in (*singles, *mistaken) if c.fit.events is None)
     growing = _Growing(search, roots)
@@ -128,20 +131,20 @@ def combine(
     happening = []
     for effect, beside in _event_partners(search, singles, transient):
         search.tell(f"looking for {effect} with {beside.effects[0]}")
-        found = search.trial.fit_events(effect, beside)
-        happening += [] if found is None else [found]
+        fitted = search.trial.fit_events(effect, beside)
+        happening += [] if fitted is None else [fitted]
     return [*sets, *happening, *growing.grow(sets)]
 
 
-def with_freed_values(search: Search, single: Candidate) -> list[Candidate]:
+def with_freed_values(search: Search, single: FittedHypothesis) -> list[FittedHypothesis]:
     """Free the parameters that an effect moves far, one at a time, next to the effect."""
-    found = []
+    fitted = []
     for name in far_parameters(search.trial, single.fit):
         search.tell(f"trying {single.hypothesis} with another {name}")
-        begun = search.trial.starts_of(single)
-        beside = search.trial.fit_together(begun, single.fit, (name,))
-        found += [] if beside is None else [beside]
-    return found
+        starts = search.trial.starts_of(single)
+        beside = search.trial.fit_together(starts, single.fit, (name,))
+        fitted += [] if beside is None else [beside]
+    return fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +179,7 @@ class _Growing:
     ----------
     search : Search
         What they are found with.
-    roots : list of Candidate
+    roots : list of FittedHypothesis
         Single effects and values that are wrong, fitted by themselves, those that weigh most first.
     done : set of Hypothesis
         Those that were fitted.
@@ -185,7 +188,7 @@ class _Growing:
     """
 
     search: Search
-    roots: list[Candidate]
+    roots: list[FittedHypothesis]
     done: set[Hypothesis] = field(default_factory=set)
     likely: list[_Partner] = field(default_factory=list)
 
@@ -194,24 +197,26 @@ class _Growing:
         """Recordings, model, noise levels."""
         return self.search.trial
 
-    def grow(self, sets: list[Candidate]) -> list[Candidate]:
+    def grow(self, sets: list[FittedHypothesis]) -> list[FittedHypothesis]:
         """Grow the best set by one term after the other."""
         weight = self.search.weight
         best = max(sets, key=weight, default=None)
-        found: list[Candidate] = []
+        grown: list[FittedHypothesis] = []
         while best is not None and len(best.terms) < self.trial.settings.most_terms:
-            formed = self._in_best_forms(best, [*sets, *found])
-            found += formed
+            formed = self._in_best_forms(best, [*sets, *grown])
+            grown += formed
             best = max(formed, key=weight)
-            tried = self.widen(best)
-            further = max(tried, key=weight, default=None)
+            widened = self.widen(best)
+            further = max(widened, key=weight, default=None)
             if further is None or not _predicts_better(further, best, self.trial):
                 break
-            found += tried
+            grown += widened
             best = further
-        return found
+        return grown
 
-    def _in_best_forms(self, base: Candidate, others: list[Candidate]) -> list[Candidate]:
+    def _in_best_forms(
+        self, base: FittedHypothesis, others: list[FittedHypothesis]
+    ) -> list[FittedHypothesis]:
         """A set with its effects in their best forms, and its rivals in the forms that it has then:
         which of them leaves least must not depend on whose forms were looked at.
         """
@@ -225,95 +230,97 @@ class _Growing:
             c for c in others if mended & set(c.effects) and c.fit.events is None
         )
 
-        def formed(rival: Candidate) -> Candidate | None:
+        def formed(rival: FittedHypothesis) -> FittedHypothesis | None:
             starts = [
                 trial.start_of((best if e in mended else rival).fit, e) for e in rival.effects
             ]
             return trial.fit_together(starts, rival.fit, rival.wrong)
 
-        tried = two_at_a_time(formed, rivals[: trial.settings.most_polished])
-        return [best, *(c for c in tried if c is not None)]
+        reformed = two_at_a_time(formed, rivals[: trial.settings.most_polished])
+        return [best, *(c for c in reformed if c is not None)]
 
-    def widen(self, base: Candidate) -> list[Candidate]:
+    def widen(self, base: FittedHypothesis) -> list[FittedHypothesis]:
         """A set with each of its likely partners, fitted from where both are."""
-        begun = self.trial.starts_of(base)
+        starts = self.trial.starts_of(base)
         partners = []
-        for partner in self._partners(base, begun):
+        for partner in self._partners(base, starts):
             if not self._was_tried(base, partner.terms):
                 self.done.add(Hypothesis((*base.terms, *partner.terms)))
                 self.search.tell(f"trying {Hypothesis((*base.terms, *partner.terms))}")
                 partners.append(partner)
 
-        def fitted(partner: _Partner) -> Candidate | None:
+        def fitted(partner: _Partner) -> FittedHypothesis | None:
             warm = replace(base.fit, values=base.fit.values | partner.values)
             wrong = (*base.wrong, *partner.wrong)
-            return self.trial.fit_together([*begun, *partner.starts], warm, wrong)
+            return self.trial.fit_together([*starts, *partner.starts], warm, wrong)
 
         return [c for c in two_at_a_time(fitted, partners) if c is not None]
 
-    def _was_tried(self, base: Candidate, terms: tuple[Term, ...]) -> bool:
+    def _was_tried(self, base: FittedHypothesis, terms: tuple[Term, ...]) -> bool:
         """True where a set was fitted with some further terms."""
         return Hypothesis((*base.terms, *terms)) in self.done
 
-    def _partners(self, base: Candidate, begun: list[Start]) -> Iterator[_Partner]:
+    def _partners(self, base: FittedHypothesis, starts: list[Start]) -> Iterator[_Partner]:
         """Partners of a set: effects whose signature is in what it leaves, terms that explain much
         alone, and parameters that it moves far.
         """
         if far_above_noise(self.trial, base):
             alone = len(base.terms) == 1
-            found = (alone and self.likely) or self._shortlisted(base, begun)
+            likely = (alone and self.likely) or self._shortlisted(base, starts)
             if alone:
-                self.likely[:] = found
-            for partner in found:
+                self.likely[:] = likely
+            for partner in likely:
                 if not any(term.excluded_by(base.effects) for term in partner.terms):
                     yield partner
         else:
             for scores in self._signatures(base):
                 if not self._was_tried(base, (scores[0].effect,)):
-                    yield self._begun_best(base, begun, scores)
+                    yield self._begun_best(base, starts, scores)
         yield from self._telling(base)
         strained = far_parameters(self.trial, base.fit) if base.effects else []
         yield from (_Partner([], (name,)) for name in strained if name not in base.wrong)
 
-    def _shortlisted(self, base: Candidate, begun: list[Start]) -> list[_Partner]:
+    def _shortlisted(self, base: FittedHypothesis, base_starts: list[Start]) -> list[_Partner]:
         """Partners of a set: effects, of all that act, that leave least with it after a few steps.
 
         Signatures are linear in what a strong mismatch is not: they rank the starts of a form.
         """
         _, ranked = self.search.rank(base)
-        starts = [
+        further = [
             score.start.scaled(score.size)
             for effect in _one_place_each(list(ranked))
             if not self._was_tried(base, (effect,))
             for score in best_of_each_kind(ranked[effect])
         ]
         best: dict[Term, _Partner] = {}
-        for found, start in self._shortly(base, begun, starts):
-            own = self.trial.start_of(found.fit, start.effect)
-            best.setdefault(start.effect, _Partner([own]))
+        for candidate, start in self._shortly(base, base_starts, further):
+            begin = self.trial.start_of(candidate.fit, start.effect)
+            best.setdefault(start.effect, _Partner([begin]))
         return list(best.values())[:_MOST_PARTNERS]
 
     def _shortly(
-        self, base: Candidate, begun: list[Start], starts: list[Start]
-    ) -> list[tuple[Candidate, Start]]:
+        self, base: FittedHypothesis, base_starts: list[Start], starts: list[Start]
+    ) -> list[tuple[FittedHypothesis, Start]]:
         """A set with an effect more, fitted in a few steps from each of its starts, with the start;
         what weighs most comes first.
         """
 
-        def begin(start: Start) -> Candidate | None:
-            return self.trial.fit_shortly([*begun, start], base.fit, base.wrong)
+        def begin(start: Start) -> FittedHypothesis | None:
+            return self.trial.fit_shortly([*base_starts, start], base.fit, base.wrong)
 
-        tried = zip(two_at_a_time(begin, starts), starts, strict=True)
-        found = [(c, start) for c, start in tried if c is not None]
-        return sorted(found, key=lambda one: self.search.weight(one[0]), reverse=True)
+        attempts = zip(two_at_a_time(begin, starts), starts, strict=True)
+        fitted = [(c, start) for c, start in attempts if c is not None]
+        return sorted(fitted, key=lambda one: self.search.weight(one[0]), reverse=True)
 
-    def _begun_best(self, base: Candidate, begun: list[Start], scores: list[Score]) -> _Partner:
+    def _begun_best(
+        self, base: FittedHypothesis, base_starts: list[Start], scores: list[Score]
+    ) -> _Partner:
         """Partner of a set: an effect from the start that leaves least after a few steps."""
         starts = [s.start.scaled(s.size) for s in scores[:MOST_STARTS]]
-        short = self._shortly(base, begun, starts if len(starts) > 1 else [])
+        short = self._shortly(base, base_starts, starts if len(starts) > 1 else [])
         return _Partner([short[0][1] if short else starts[0]])
 
-    def _signatures(self, base: Candidate) -> list[list[Score]]:
+    def _signatures(self, base: FittedHypothesis) -> list[list[Score]]:
         """The effects that would take most of what a set leaves, each from all its starts."""
         trial = self.trial
         tangent, ranked = self.search.rank(base)
@@ -325,16 +332,16 @@ class _Growing:
         # what is left in one block may be little beside what another one had: an effect of that
         # block alone is tested by itself
         for block in _blocks_untouched(base, self.search.start, trial) if alone else []:
-            there = [
+            in_block = [
                 effect
                 for effect, scores in ranked.items()
                 if [b for b in trial.suspects if acts_in(effect, b)] == [block]
                 and scores[0].gain > LEAST_GAIN
             ]
-            best += [effect for effect in there[:1] if effect not in best]
+            best += [effect for effect in in_block[:1] if effect not in best]
         return [ranked[effect] for effect in best]
 
-    def _telling(self, base: Candidate) -> list[_Partner]:
+    def _telling(self, base: FittedHypothesis) -> list[_Partner]:
         """Partners that take a large share of the mismatch alone.
 
         The signature of a strong effect beside another one is linear in what is not; where both
@@ -367,8 +374,8 @@ def _one_place_each(terms: list[Term]) -> list[Term]:
 
 
 def _event_partners(
-    search: Search, singles: list[Candidate], happening: list[Term]
-) -> list[tuple[Term, Candidate]]:
+    search: Search, singles: list[FittedHypothesis], happening: list[Term]
+) -> list[tuple[Term, FittedHypothesis]]:
     """Effects with times of their own, each with a persistent one that may have acted as well.
 
     That is the persistent effect that weighs most, if it leaves much; and, of those that were
@@ -377,31 +384,32 @@ def _event_partners(
     trial, screened, start = search.trial, search.screened, search.start
     steady = [c for c in singles if c.fit.events is None]
     best = max(steady, key=search.weight, default=start)
-    asked = _TRANSIENT_BESIDE < search.share_left(best) < _MUCH_LEFT
-    found = [(e, best) for e in happening] if asked else []
+    leaves_some = _TRANSIENT_BESIDE < search.share_left(best) < _MUCH_LEFT
+    pairs = [(e, best) for e in happening] if leaves_some else []
     mismatch = float(screened.tangent.rows @ screened.tangent.rows)
     for single in singles:
         if single.fit.events is None or search.share_left(single) > _MUCH_LEFT:
             continue
         # what the baseline can do is taken as without the events
-        kept = start.fit.residuals
-        left = {
-            key: replace(r, jacobian=kept[key].jacobian) for key, r in single.fit.residuals.items()
+        baseline_residuals = start.fit.residuals
+        left_by_events = {
+            key: replace(r, jacobian=baseline_residuals[key].jacobian)
+            for key, r in single.fit.residuals.items()
         }
-        beside = replace(start.fit, residuals=left, moved=single.fit.moved)
+        beside = replace(start.fit, residuals=left_by_events, moved=single.fit.moved)
         least = max(LEAST_GAIN, _PARTNER_SHARE * mismatch)
-        told = [
+        shown = [
             s
             for s in screened.scores(tangent_of(beside, trial.inner, trial.white))
             if s.gain > least
         ]
-        partner = next((c for s in told for c in steady if c.effects == (s.effect,)), None)
-        if partner is not None and (single.effects[0], partner) not in found:
-            found.append((single.effects[0], partner))
-    return found
+        partner = next((c for s in shown for c in steady if c.effects == (s.effect,)), None)
+        if partner is not None and (single.effects[0], partner) not in pairs:
+            pairs.append((single.effects[0], partner))
+    return pairs
 
 
-def in_best_forms(search: Search, base: Candidate) -> Candidate:
+def in_best_forms(search: Search, base: FittedHypothesis) -> FittedHypothesis:
     """Set with each of its effects in the form that leaves least together with the others.
 
     The form that an effect had alone is the one that did best for everything that was missing.
@@ -410,12 +418,12 @@ def in_best_forms(search: Search, base: Candidate) -> Candidate:
     ----------
     search : Search
         With the signatures from which other forms begin.
-    base : Candidate
+    base : FittedHypothesis
         A set of lasting effects and values that are wrong, fitted.
 
     Returns
     -------
-    Candidate
+    FittedHypothesis
         The set itself where it leaves noise, and where no other form leaves less.
     """
     if len(base.terms) < 2 or base.fit.events is not None:
@@ -436,8 +444,8 @@ def in_best_forms(search: Search, base: Candidate) -> Candidate:
 
 
 def _in_another_form(
-    search: Search, base: Candidate, effect: Term, scores: list[Score]
-) -> Candidate | None:
+    search: Search, base: FittedHypothesis, effect: Term, scores: list[Score]
+) -> FittedHypothesis | None:
     """A set with one effect in another form, where one leaves clearly less."""
     trial = search.trial
     now = trial.start_of(base.fit, effect)
@@ -451,23 +459,25 @@ def _in_another_form(
     search.tell(f"trying other forms of {effect} in {base.hypothesis}")
     rest = [trial.start_of(base.fit, e) for e in base.effects if e != effect]
 
-    def begin(start: Start) -> Candidate | None:
+    def begin(start: Start) -> FittedHypothesis | None:
         # parameters that both forms have go on from where they are
-        own = {n: base.fit.values.get(n, value) for n, value in start.free.items()}
-        begun = [*rest, replace(start, free=own)]
-        return trial.fit_shortly(begun, base.fit, base.wrong)
+        free = {n: base.fit.values.get(n, value) for n, value in start.free.items()}
+        starts = [*rest, replace(start, free=free)]
+        return trial.fit_shortly(starts, base.fit, base.wrong)
 
     short = [c for c in two_at_a_time(begin, others) if c is not None]
     best = min(short, key=lambda c: c.misfit, default=None)
     if best is None or best.misfit > base.misfit / NEAR_PLACE:
         return None
-    found = trial.fit_together(trial.starts_of(best), best.fit, base.wrong)
-    if found is None or log_misfit(found) > log_misfit(base) - FORM_SHARE_ALIKE:
+    fitted = trial.fit_together(trial.starts_of(best), best.fit, base.wrong)
+    if fitted is None or log_misfit(fitted) > log_misfit(base) - FORM_SHARE_ALIKE:
         return None
-    return replace(found, gain=base.gain)
+    return replace(fitted, gain=base.gain)
 
 
-def _blocks_untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[Block]:
+def _blocks_untouched(
+    candidate: FittedHypothesis, start: FittedHypothesis, trial: Attempts
+) -> list[Block]:
     """Blocks in which a set leaves most of what was too much there, in recordings that were fitted
     or held out.
     """
@@ -483,49 +493,51 @@ def _blocks_untouched(candidate: Candidate, start: Candidate, trial: Attempts) -
     ]
 
 
-def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bool:
+def _predicts_better(further: FittedHypothesis, best: FittedHypothesis, trial: Attempts) -> bool:
     """True where a larger set takes a large share of what a smaller one leaves of held-out
     recordings, and more than the pieces of the recordings differ in it.
     """
-    taken, left = [], 0.0
+    taken, left_before = [], 0.0
     for block in trial.suspects:
         before, after = (c.held_out[block.name].pieces for c in (best, further))
         taken += [n * (was - now) for (was, n), (now, _) in zip(before, after, strict=True)]
-        left += sum(n * (was - 1.0) for was, n in before)
-    if len(taken) < 2 or left <= 0.0:
+        left_before += sum(n * (was - 1.0) for was, n in before)
+    if len(taken) < 2 or left_before <= 0.0:
         return False
     error = math.sqrt(len(taken)) * float(np.std(taken, ddof=1))
     gained = float(sum(taken))
-    return gained > _FURTHER_ERRORS * error and gained > FURTHER_SHARE * left
+    return gained > _FURTHER_ERRORS * error and gained > FURTHER_SHARE * left_before
 
 
-def far_above_noise(trial: Attempts, found: Candidate) -> bool:
+def far_above_noise(trial: Attempts, candidate: FittedHypothesis) -> bool:
     """True where so much more than noise is left that linear signatures say little."""
-    inside = found.fitted
+    inside = candidate.fitted
     if any(level.curves is not None for level in trial.noise_level.values()):
         none = dict.fromkeys((b.name for b in trial.inner.blocks), 0.0)
         bare = replace(trial, noise_level=with_sizes(trial.noise_level, none))
-        inside = {b.name: bare.excess(b, trial.inner, found.fit.residuals) for b in trial.suspects}
+        inside = {
+            b.name: bare.excess(b, trial.inner, candidate.fit.residuals) for b in trial.suspects
+        }
     return any(
-        max(kept[b.name].ratio, kept[b.name].systematic ** 2) > _STRONG_RATIO
+        max(excess_by_block[b.name].ratio, excess_by_block[b.name].systematic ** 2) > _STRONG_RATIO
         for b in trial.suspects
-        for kept in (inside, found.held_out)
+        for excess_by_block in (inside, candidate.held_out)
     )
 
 
-def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
+def settles(candidate: FittedHypothesis, trial: Attempts, start: FittedHypothesis) -> bool:
     """True where a hypothesis leaves only noise, so that no pair is called for."""
     return explains(candidate, start, trial.compared)
 
 
-def cannot_gain(candidate: Candidate, trial: Attempts) -> bool:
+def cannot_gain(candidate: FittedHypothesis, trial: Attempts) -> bool:
     """True where no further one-parameter effect could pay for itself."""
     evidence = trial.settings
     least = evidence.further_price + evidence.parameter_price
     return possible_gain(candidate, trial.compared) < least
 
 
-def log_misfit(candidate: Candidate) -> float:
+def log_misfit(candidate: FittedHypothesis) -> float:
     """Logarithm of what a hypothesis leaves of each block, on fitted and on held-out recordings:
     by it the forms of an effect are compared.
     """

@@ -16,7 +16,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import WALL_TOLERANCES, Attempts, BlockGroup, Candidate, significant
+from pamrs.diagnosis.evidence import (
+    WALL_TOLERANCES,
+    Attempts,
+    BlockGroup,
+    FittedHypothesis,
+    significant,
+)
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -77,9 +83,11 @@ def suspected_values(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
     list of tuple of str
         Dotted names.
     """
-    moved = [name for name, own in fitted.moved.items() if abs(own) >= _SUSPECTED_TOLERANCES]
+    moved = [
+        name for name, distance in fitted.moved.items() if abs(distance) >= _SUSPECTED_TOLERANCES
+    ]
     at_wall = [name for name in moved if abs(fitted.moved[name]) >= WALL_TOLERANCES]
-    found: list[tuple[str, ...]] = [(name,) for name in moved]
+    sets: list[tuple[str, ...]] = [(name,) for name in moved]
     for one, other in itertools.permutations(fitted.moved, 2):
         together = any({one, other} <= block.parameters for block in blocks) and _same_owner(
             one, other
@@ -89,8 +97,8 @@ def suspected_values(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
             and together
             and not {one, other}.isdisjoint(at_wall)
         ):
-            found.append((one, other))
-    return found
+            sets.append((one, other))
+    return sets
 
 
 def _same_owner(one: str, other: str) -> bool:
@@ -113,7 +121,7 @@ def free_suspects(
     first: Fit,
     say: Callable[[str], None],
     share: float | None = None,
-) -> list[Candidate]:
+) -> list[FittedHypothesis]:
     """The suspected parameters, each freed and fitted, and the pairs of the largest gain predicted
     by the linear model.
 
@@ -138,8 +146,8 @@ def free_suspects(
     walls = trial.settings.most_tolerances
     suspects = [
         names
-        for found in (baseline, first)
-        for names in suspected_values(found, trial.inner.blocks)
+        for freed in (baseline, first)
+        for names in suspected_values(freed, trial.inner.blocks)
     ]
     gains = _worth_a_fit(trial, baseline, list(dict.fromkeys(suspects)), trial.white)
     # the linear model says little of what is far away: each parameter is fitted, whatever its
@@ -148,15 +156,15 @@ def free_suspects(
     pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][
         :_MOST_PAIRS
     ]
-    found = []
+    freed = []
     sets = [names for names in gains if len(names) == 1 or names in pairs]
     for names, candidate in _fit_freed(trial, sets, baseline, say, share).items():
         if candidate is not None and candidate.is_wrong(walls):
-            found.append(replace(candidate, gain=gains[names]))
-    return found
+            freed.append(replace(candidate, gain=gains[names]))
+    return freed
 
 
-def far_parameters(trial: Attempts, found: Fit) -> list[str]:
+def far_parameters(trial: Attempts, fitted: Fit) -> list[str]:
     """Parameters that a fit with effects moved far, and whose freeing promises most by the linear
     model; the most promising first.
 
@@ -164,23 +172,23 @@ def far_parameters(trial: Attempts, found: Fit) -> list[str]:
     ----------
     trial : Attempts
         Recordings, model, noise levels.
-    found : Fit
+    fitted : Fit
         A fit with effects.
     """
     far: list[tuple[str, ...]] = [
-        (name,) for name, moved in found.moved.items() if abs(moved) >= _FAR_TOLERANCES
+        (name,) for name, moved in fitted.moved.items() if abs(moved) >= _FAR_TOLERANCES
     ]
-    gains = _worth_a_fit(trial, found, far, trial.autocorrelation(found))
+    gains = _worth_a_fit(trial, fitted, far, trial.autocorrelation(fitted))
     return [name for (name,) in gains][:_MOST_BESIDE]
 
 
 def _worth_a_fit(
-    trial: Attempts, found: Fit, sets: list[tuple[str, ...]], inflation: dict[str, float]
+    trial: Attempts, fitted: Fit, sets: list[tuple[str, ...]], inflation: dict[str, float]
 ) -> dict[tuple[str, ...], float]:
     """Sets of parameters whose freeing is worth a fit by the linear model, with their gain in
     chi-square, the largest first.
     """
-    gains = _predicted_gain(trial.inner, trial.nominal, found, sets, inflation)
+    gains = _predicted_gain(trial.inner, trial.nominal, fitted, sets, inflation)
     return {
         n: gains[n]
         for n in sorted(gains, key=lambda n: -gains[n])
@@ -194,20 +202,22 @@ def _fit_freed(
     baseline: Fit,
     say: Callable[[str], None],
     share: float | None,
-) -> dict[tuple[str, ...], Candidate | None]:
+) -> dict[tuple[str, ...], FittedHypothesis | None]:
     """Each set of parameters freed: those that leave least after a few steps are fitted to their
     end, the others come as they are.
     """
 
-    def to_the_end(several: list[tuple[str, ...]]) -> dict[tuple[str, ...], Candidate | None]:
+    def to_the_end(
+        several: list[tuple[str, ...]],
+    ) -> dict[tuple[str, ...], FittedHypothesis | None]:
         ended = two_at_a_time(lambda names: trial.fit_freed(names, baseline, share), several)
         return dict(zip(several, ended, strict=True))
 
     if len(sets) <= _MOST_FINISHED:
         return to_the_end(sets)
     say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
-    begun = zip(sets, two_at_a_time(trial.fit_freed_shortly, sets), strict=True)
-    short = {names: c for names, c in begun if c is not None}
+    attempts = zip(sets, two_at_a_time(trial.fit_freed_shortly, sets), strict=True)
+    short = {names: c for names, c in attempts if c is not None}
     worth = [names for names in short if not _needless(names, short, trial)]
     best = sorted(worth, key=lambda names: short[names].misfit)[:_MOST_FINISHED]
     if best and not any(significant(e) for e in short[best[0]].fitted.values()):
@@ -218,11 +228,11 @@ def _fit_freed(
 
 
 def _needless(
-    names: tuple[str, ...], short: Mapping[tuple[str, ...], Candidate], trial: Attempts
+    names: tuple[str, ...], short: Mapping[tuple[str, ...], FittedHypothesis], trial: Attempts
 ) -> bool:
     """True where one of several parameters, freed alone, leaves nearly as little."""
     alone = [short[name,].misfit for name in names if (name,) in short] if len(names) > 1 else []
-    return any((1.0 - FURTHER_SHARE) * own < short[names].misfit for own in alone)
+    return any((1.0 - FURTHER_SHARE) * misfit < short[names].misfit for misfit in alone)
 
 
 def _predicted_gain(
@@ -247,7 +257,7 @@ def _predicted_gain(
     ]
     # the triangle of a QR decomposition has the same sums of squares in a few rows
     triangle: Array = np.asarray(np.linalg.qr(np.column_stack([scaled, rows]), mode="r"))
-    slopes, left = triangle[:, :-1], triangle[:, -1]
+    slopes, rest = triangle[:, :-1], triangle[:, -1]
     begin = np.array([baseline.moved[n] for n in names])
     known = known_parameters(nominal)
     ends = [ends_in_tolerances(known[n], math.inf) for n in names]
@@ -260,7 +270,7 @@ def _predicted_gain(
 
         def evaluate(x: Array) -> tuple[Array, Array, None]:
             return (
-                np.concatenate([left + slopes @ (x - begin), bound * x]),
+                np.concatenate([rest + slopes @ (x - begin), bound * x]),
                 np.concatenate([slopes, prior]),
                 None,
             )
@@ -275,7 +285,7 @@ def _predicted_gain(
     return {loose: was - cost(loose) for loose in suspects}
 
 
-def price_of_wrong(candidate: Candidate, settings: DiagnosisSettings) -> float:
+def price_of_wrong(candidate: FittedHypothesis, settings: DiagnosisSettings) -> float:
     """Logarithm of what wrong values cost where the baseline explains all: a file that is further
     outside its tolerances is rarer, but less and less so.
     """
@@ -283,7 +293,7 @@ def price_of_wrong(candidate: Candidate, settings: DiagnosisSettings) -> float:
     return settings.file_log_odds * len(candidate.wrong) + outside
 
 
-def weigh_only_noise(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> BlockGroup:
+def weigh_only_noise(quiet: BlockGroup, prices: Mapping[FittedHypothesis, float]) -> BlockGroup:
     """A group whose baseline leaves only noise, with further hypotheses and the logarithm of what
     each costs; those that leave more than noise, or predict worse, are left out.
     """
@@ -293,21 +303,21 @@ def weigh_only_noise(quiet: BlockGroup, prices: Mapping[Candidate, float]) -> Bl
         for c, price in prices.items()
         if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)
     }
-    top, kept_at = max(0.0, *scores.values(), 0.0), quiet.probabilities[UNDECIDED]
-    weights = {c.hypothesis: kept_at * math.exp(score - top) for c, score in scores.items()}
-    kept = {h: p * math.exp(-top) for h, p in quiet.probabilities.items()}
-    total = sum(weights.values()) + sum(kept.values())
-    probabilities = {h: w / total for h, w in (kept | weights).items()}
+    top, undecided = max(0.0, *scores.values(), 0.0), quiet.probabilities[UNDECIDED]
+    weights = {c.hypothesis: undecided * math.exp(score - top) for c, score in scores.items()}
+    before = {h: p * math.exp(-top) for h, p in quiet.probabilities.items()}
+    total = sum(weights.values()) + sum(before.values())
+    probabilities = {h: w / total for h, w in (before | weights).items()}
     return replace(quiet, candidates=[*quiet.candidates, *scores], probabilities=probabilities)
 
 
-def _plausibility(candidate: Candidate) -> float:
+def _plausibility(candidate: FittedHypothesis) -> float:
     """Logarithm of how probable a hypothesis makes the recordings, and its own values."""
-    told = sum(found.most for found in candidate.likelihood().values())
-    return told - 0.5 * (candidate.fit.strain + candidate.fit.start_strain)
+    evidence = sum(likelihood.most for likelihood in candidate.likelihood().values())
+    return evidence - 0.5 * (candidate.fit.strain + candidate.fit.start_strain)
 
 
-def _carries_over(candidate: Candidate, start: Candidate) -> bool:
+def _carries_over(candidate: FittedHypothesis, start: FittedHypothesis) -> bool:
     """True where held-out recordings are predicted as well as by the baseline, or to noise."""
     pairs = [(candidate.held_out[name], was) for name, was in start.held_out.items()]
     return all(now.ratio <= max(now.limit, was.ratio) for now, was in pairs)

@@ -1,0 +1,111 @@
+"""Sets are fitted until the weights are those of what they leave, and each of their effects has the
+form that leaves least beside the others; of several groups the one that knows an effect best says
+its values.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+import pamrs
+from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, significant
+from pamrs.diagnosis.fit import fit, form_in, starts_of
+from pamrs.diagnosis.model import owners_of_effects
+from pamrs.diagnosis.screen import screen
+from pamrs.diagnosis.search._sets import _STRONG_RATIO, Search, far_above_noise, in_best_forms
+from pamrs.effects import Term
+from tests.diagnosis.again import case
+from tests.diagnosis.asked import SETTINGS, problem_of
+from tests.diagnosis.held import RIG, attempts
+from tests.diagnosis.terms import terms
+
+SHOULDER = pamrs.rigs.shoulder()
+LEAKY = RIG.with_effect("leak_muscle", {"conductance": 5e-12, "exponent": 1.6}, form="power")
+
+
+@pytest.fixture(scope="module")
+def trial() -> Attempts:
+    """A chamber with a leak in its second form, held from three pressures, the last one held
+    out.
+    """
+    return attempts(LEAKY, (8e5, 5e5, 3e5), 60.0)
+
+
+def hurried(trial: Attempts, evaluations: int) -> FittedHypothesis:
+    """A leak in its first form and the heat of the wall, fitted in so many evaluations."""
+    starts = [starts_of(effect, sealed=True)[0] for effect in terms("leak_muscle", "heat_transfer")]
+    free = {name: value for start in starts for name, value in start.free.items()}
+    held = {name: value for start in starts for name, value in start.held.items()}
+    effects = tuple(start.effect for start in starts)
+    found = fit(trial.inner, RIG, effects, free, trial.white, fixed=held, evaluations=evaluations)
+    return trial.judge(effects, found)
+
+
+def test_a_set_ends_weighted_by_what_it_leaves(trial: Attempts) -> None:
+    begun = hurried(trial, 1)
+    ended = trial.polish(begun)
+    first, last = trial.autocorrelation(begun.fit), trial.autocorrelation(ended.fit)
+    for block, left in last.items():
+        assert first[block] > 10.0 * left  # it left far more where it began
+        assert ended.fit.inflation[block] <= 2.0 * left
+
+
+def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(trial: Attempts) -> None:
+    base = hurried(trial, 20)
+    assert any(significant(kept) for kept in base.fitted.values())
+    start = fit(trial.inner, RIG, (), {}, trial.white)
+    both = list(terms("leak_muscle", "heat_transfer"))
+    screened = screen(trial.inner, start, both, trial.white, sealed=True)
+    told: list[str] = []
+    search = Search(trial, screened, base, Weighing(0.985, 60.0, SETTINGS), told.append)
+    found = in_best_forms(search, base)
+    assert told[0] == "trying other forms of leak_muscle in leak_muscle+heat_transfer"
+    assert form_in(found.fit.rig, Term("leak_muscle")) == "power"
+    assert found.misfit < base.misfit
+    assert found.fit.values["leak_muscle.exponent"] == pytest.approx(1.6, abs=0.1)
+
+
+def test_what_is_far_above_the_noise_is_so_by_its_size_or_its_power(trial: Attempts) -> None:
+    base = hurried(trial, 20)
+    (block,) = trial.suspects
+    strong = _STRONG_RATIO
+
+    def left(ratio: float, systematic: float) -> FittedHypothesis:
+        kept = replace(base.fitted[block.name], ratio=ratio, systematic=systematic)
+        return replace(base, fitted={block.name: kept}, held_out={block.name: kept})
+
+    assert not far_above_noise(trial, left(0.9 * strong, 0.9 * math.sqrt(strong)))
+    assert far_above_noise(trial, left(1.1 * strong, 1.0))
+    assert far_above_noise(trial, left(1.0, 1.1 * math.sqrt(strong)))
+
+
+def group(std: dict[str, float], *effects: str) -> FittedHypothesis:
+    """A fit that knows its parameters so well."""
+    own = SimpleNamespace(values=dict.fromkeys(std, 1.0), std=std)
+    return cast("FittedHypothesis", SimpleNamespace(fit=own, effects=terms(*effects)))
+
+
+def test_the_group_that_knows_an_effect_best_has_its_values() -> None:
+    chamber = group({"clock_skew.offset": 2e-3, "clock_skew.rate": 1e-4}, "clock_skew")
+    arm = group({"clock_skew.offset": math.inf, "clock_skew.rate": math.inf}, "clock_skew")
+    vague = group({"clock_skew.offset": 0.1, "clock_skew.rate": 1e-2}, "clock_skew")
+    assert owners_of_effects([chamber, arm]) == {Term("clock_skew"): 0}
+    assert owners_of_effects([arm, chamber]) == {Term("clock_skew"): 1}
+    assert owners_of_effects([vague, chamber, vague]) == {Term("clock_skew"): 1}
+
+
+def test_what_no_residual_depends_on_is_not_known() -> None:
+    problem = problem_of(SHOULDER, case(SHOULDER, SHOULDER).recordings[:1], "arm")
+    # pressure and angle of one logger: the arm does not see when they were recorded
+    free = {"clock_skew.offset": 0.01, "clock_skew.rate": 1e-4}
+    fixed = {"clock_skew.angle_share": 1.0}
+    given = (problem, SHOULDER, terms("clock_skew"), free, {"arm": 1.0})
+    found = fit(*given, fixed=fixed, evaluations=2)
+    assert math.isinf(found.std["clock_skew.offset"])
+    assert math.isinf(found.std["clock_skew.rate"])
+    assert all(math.isfinite(found.std[name]) for name in found.moved)
