@@ -1,0 +1,56 @@
+"""What models that were fitted before leave of a new recording: a prediction is scored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pamrs.diagnosis.next_experiment._choice import Modelled
+from pamrs.diagnosis.next_experiment._differences import (
+    linear,
+    measurable,
+    misfit,
+    problem_of,
+    weights_of,
+)
+from pamrs.diagnosis.prepare import prepare
+from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.recordings import Recording
+
+
+def foretold(
+    hypotheses: Sequence[Modelled], recording: Recording, settings: DiagnosisSettings | None = None
+) -> dict[str, tuple[str, float]]:
+    """What each hypothesis leaves of a recording that it was not fitted to, its parameters moved no
+    farther than what was known of them before.
+
+    Parameters
+    ----------
+    hypotheses : sequence of (label, rig, probability)
+        Rigs as fitted, with their effects.
+    recording : Recording
+        Of the same rig.
+    settings : DiagnosisSettings, optional
+        How it is made ready; the published ones by default.
+
+    Returns
+    -------
+    dict of str to (str, float)
+        By label the channel that is missed most, and by how much [noise levels].
+
+    Raises
+    ------
+    DiagnosisError
+        If the channels of the recording surround no block.
+    SimulationError
+        If a model leaves the range in which it holds.
+    """
+    chosen = DiagnosisSettings() if settings is None else settings
+    found = {}
+    for label, rig, _ in hypotheses:
+        there = recording.rig_there(rig)
+        own = tuple(name for name in measurable(there) if name in recording.channels)
+        problem = problem_of(there, [prepare(recording, there, chosen)], own, chosen)
+        left = misfit(problem, linear(problem, there), weights_of(problem, there))
+        (block, _), size = left.largest
+        found[label] = (next(b.channel for b in problem.blocks if b.name == block), size)
+    return found
