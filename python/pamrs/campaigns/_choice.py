@@ -5,7 +5,7 @@ what is open.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -15,9 +15,10 @@ from pamrs.campaigns._budget import Budget, Cost, cost_of
 from pamrs.channels import channel_of
 from pamrs.diagnosis import Diagnosis, DiagnosisSettings
 from pamrs.diagnosis.next_experiment import Plan, measurable, plan_diagnosis, propose
+from pamrs.effects import NONE
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.experiments import Experiment, experiments_of, library
-from pamrs.findings import HEALTHY, Curves, NextExperiment
+from pamrs.findings import HEALTHY, NextExperiment
 from pamrs.recordings import Recording
 from pamrs.report.text import hypothesis_label, listed, spoken_name
 from pamrs.rig import Rig
@@ -41,21 +42,15 @@ class Proposal:
         Whether it was played before.
     rivals : list of (str, Rig, float)
         Models that predict it: label, rig, probability.
-    curves : Curves or None
-        What they predict, where they were compared.
     bits : float or None
-        What it is expected to tell [bit].
-    cost : Cost
-        What it takes.
+        What it is expected to tell [bit]; None where rivals were not compared.
     """
 
     experiment: Experiment
     why: str
     repeats: bool = False
     rivals: list[tuple[str, Any, float]] = field(default_factory=list)
-    curves: Curves | None = None
     bits: float | None = None
-    cost: Cost = field(default_factory=Cost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,20 +152,20 @@ def shows_of(plan: Plan) -> dict[str, list[str]]:
 def plan_of(rig: Rig, recordings: Sequence[Recording], settings: DiagnosisSettings) -> Plan:
     """A plan with the channels that were recorded; with all that are usual before there are any."""
     usual = [
-        name
-        for name in measurable(rig)
-        if channel_of(name) not in ("temperature", "line_pressure")
+        name for name in measurable(rig) if channel_of(name) not in ("temperature", "line_pressure")
     ]
     heard = [n for n in measurable(rig) if recordings and all(n in r.channels for r in recordings)]
     return plan_diagnosis(rig, heard or usual, settings=settings)
 
 
-def unseen(diagnosis: Diagnosis | None, shows: Mapping[str, list[str]]) -> list[str]:
-    """Effects that the recordings would not show at their usual size, and an experiment would."""
-    seen = set()
-    if diagnosis is not None:
-        seen = {own.effect for own in diagnosis.limits if own.verdict != "not seen"}
-    return [effect for effect in shows if effect not in seen]
+def unseen(diagnosis: Diagnosis) -> list[str]:
+    """Effects that the recordings would not show at their usual size."""
+    return [own.effect for own in diagnosis.limits if own.verdict == "not seen"]
+
+
+def is_healthy(diagnosis: Diagnosis) -> bool:
+    """Whether nothing is missing, and no value is wrong, by a diagnosis."""
+    return diagnosis.verdict in HEALTHY and not diagnosis.answer.names
 
 
 def is_open(diagnosis: Diagnosis | None, blind: Sequence[str], recordings: int) -> str:
@@ -181,7 +176,7 @@ def is_open(diagnosis: Diagnosis | None, blind: Sequence[str], recordings: int) 
         return diagnosis.headline
     if recordings < 2:
         return "the answer rests on one recording, and has not predicted another one yet"
-    if diagnosis.verdict in HEALTHY and blind:
+    if is_healthy(diagnosis) and blind:
         return f"these recordings would not show {_effects(blind)} at its usual size"
     return ""
 
@@ -205,11 +200,12 @@ def proposed(
     allowed = pool.again if repeat else pool.new
     if diagnosis is not None and not diagnosis.answer.settled and len(rivals) > 1:
         found = _parting(rig, own, allowed, recordings, settings)
-        if found is not None or repeat:
-            return found
-    if not rivals:
-        best = rig if diagnosis is None or diagnosis.rig is None else diagnosis.rig
-        rivals = [("none" if diagnosis is None else diagnosis.verdict, best, 1.0)]
+        if found is not None:
+            return replace(found, repeats=repeat)
+        if repeat:
+            return None
+    if not any(label == str(NONE) for label, _, _ in rivals):
+        rivals.append((str(NONE), rig, 0.0 if rivals else 1.0))  # what the rig file says
     if own.protocol is not None and own.protocol.name in allowed:
         return Proposal(allowed[own.protocol.name], own.text, repeat, rivals)
     if repeat:
@@ -230,18 +226,12 @@ def _parting(
     settings: DiagnosisSettings,
 ) -> Proposal | None:
     """The allowed experiment that parts most of what is left; None where none does."""
-    name = own.protocol.name if own.protocol is not None else ""
-    same = name in allowed and own.curves is not None
-    if same and own.protocol is not None:
-        mine = allowed[name].commands
-        same = all(
-            k in mine and np.array_equal(mine[k], v) for k, v in own.protocol.commands.items()
-        )
-    if not same:
-        if not allowed:
-            return None
+    if not allowed:
+        return None
+    found = own
+    if not _is_of(own, allowed):
         try:
-            own = propose(
+            found = propose(
                 rig,
                 own.hypotheses,
                 own.noise,
@@ -251,12 +241,21 @@ def _parting(
             )
         except DiagnosisError:  # none of them can be simulated with every rival
             return None
-    if own.protocol is None or (own.expected_information_bits or 0.0) < _LEAST_BITS:
+    bits = found.expected_information_bits or 0.0
+    if found.protocol is None or found.curves is None or bits < _LEAST_BITS:
         return None
-    chosen = allowed[own.protocol.name]
-    models = {label: (label, model, p) for label, model, p in own.hypotheses}
-    return Proposal(
-        chosen, own.text, False, list(models.values()), own.curves, own.expected_information_bits
+    compared = [rival for rival in own.hypotheses if rival[0] in found.curves.predicted]
+    return Proposal(allowed[found.protocol.name], found.text, False, compared, bits)
+
+
+def _is_of(own: NextExperiment, allowed: Mapping[str, Experiment]) -> bool:
+    """Whether what a diagnosis proposes is one of the allowed experiments, command by command."""
+    mine = allowed.get(own.protocol.name) if own.protocol is not None else None
+    if mine is None or own.protocol is None or own.curves is None:
+        return False
+    theirs = own.protocol.commands
+    return theirs.keys() == mine.commands.keys() and all(
+        np.array_equal(theirs[name], values) for name, values in mine.commands.items()
     )
 
 

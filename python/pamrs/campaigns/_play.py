@@ -36,7 +36,9 @@ class _Player(Controller):
         self.lead = round(commands.bench.settle / period)
         step_time = float(protocol.time[1] - protocol.time[0])
         count = int(float(protocol.time[-1]) / period + 1e-6) + 1
-        held = np.minimum((np.arange(count) * period / step_time + 1e-6).astype(int), len(protocol.time) - 1)
+        held = np.minimum(
+            (np.arange(count) * period / step_time + 1e-6).astype(int), len(protocol.time) - 1
+        )
         own = {name: np.asarray(values)[held] for name, values in protocol.commands.items()}
         self.sent: dict[str, Array] = {
             name: own.get(name, np.full(count, safe)) for name, safe in commands.safe.items()
