@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
+from pamrs.diagnosis.fit import FIT_BIN_TIME, bin_width
 from pamrs.diagnosis.next_experiment._choice import Modelled
 from pamrs.diagnosis.next_experiment._differences import (
     linear,
@@ -12,6 +14,7 @@ from pamrs.diagnosis.next_experiment._differences import (
     problem_of,
     weights_of,
 )
+from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import prepare
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.recordings import Recording
@@ -35,7 +38,8 @@ def foretold(
     Returns
     -------
     dict of str to (str, float)
-        By label the channel that is missed most, and by how much [noise levels].
+        By label the channel that is missed most, and by how much: root mean square in bins
+        of 0.1 s, 1 where noise is all that is left [noise levels].
 
     Raises
     ------
@@ -49,8 +53,17 @@ def foretold(
     for label, rig, _ in hypotheses:
         there = recording.rig_there(rig)
         own = tuple(name for name in measurable(there) if name in recording.channels)
-        problem = problem_of(there, [prepare(recording, there, chosen)], own, chosen)
-        left = misfit(problem, linear(problem, there), weights_of(problem, there))
-        (block, _), size = left.largest
-        found[label] = (next(b.channel for b in problem.blocks if b.name == block), size)
+        prepared = prepare(recording, there, chosen)
+        problem = problem_of(there, [prepared], own, chosen)
+        weights = weights_of(problem, there)
+        left = misfit(problem, linear(problem, there), weights)
+        # in bins as short as those of the fit a sensor's own noise is larger than in its level
+        white = bins_of(prepared) / bin_width(prepared, FIT_BIN_TIME)
+        sizes = {
+            block: size / math.sqrt(1.0 + (white - 1.0) / weights[block, name] ** 2)
+            for (block, name), size in left.rms.items()
+        }
+        worst = max(sizes, key=lambda block: sizes[block])
+        channel = next(b.channel for b in problem.blocks if b.name == worst)
+        found[label] = (channel, sizes[worst])
     return found
