@@ -48,6 +48,8 @@ class Bench:
     plausible : mapping of str to (float, float)
         Lowest and highest value of a channel that can be [SI]; a device that shows another one for
         a tenth of a second is stopped. By default from the rig file.
+    unattended : bool
+        Whether nobody is there who hangs another payload on, as always with a device.
     """
 
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -57,6 +59,7 @@ class Bench:
     highest: float | None = None
     period: float | None = None
     plausible: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    unattended: bool = False
 
 
 class Commands:

@@ -44,9 +44,11 @@ class Campaign:
     Attributes
     ----------
     path : Path
-        Its folder: ``campaign.json``, ``campaign.html``, and a folder for each step.
+        Its folder: ``campaign.json``, ``campaign.html``, ``result.json`` of the last diagnosis, and
+        a folder for each step.
     diagnosis : Diagnosis or None
-        The last one; None before anything was recorded.
+        The last one that this call made: with ``no recording`` there may be none, and
+        ``result.json`` in the folder has the one before.
     steps : list of Step
         What was proposed, foretold, played and found.
     why : str
@@ -172,7 +174,6 @@ class _Work:
     def run(self) -> Campaign:
         """On from where it was, to an end."""
         self.folder.ended = {}
-        self.diagnose()
         while not self.folder.ended:
             step = self.folder.open
             if step is None:
@@ -215,6 +216,7 @@ class _Work:
         if every:
             case = Case(self.rig.name, self.rig, every, self.folder.path)
             self.found = diagnose(case, settings=self.settings, progress=self.progress)
+            self.found.to_json(self.folder.path / "result.json")
 
     def end(self, why: str, text: str) -> None:
         """Say why it ends."""
@@ -223,6 +225,8 @@ class _Work:
     def next(self) -> None:
         """Propose the next experiment, or end."""
         recordings, spent = self.recordings, self.folder.spent
+        if self.found is None:
+            self.diagnose()
         wanted = self.wanted
         what = is_open(self.found, list(wanted), len(recordings))
         headline = "" if self.found is None else self.found.headline
@@ -237,7 +241,7 @@ class _Work:
             self.folder.played,
             (self.budget, spent),
             self.settings,
-            hands=self.device is None,
+            hands=self.device is None and not self.commands.bench.unattended,
         )
         last = self.folder.steps[-_UNCHANGED:]
         stuck = len(last) == _UNCHANGED and not any(step.changed for step in last)

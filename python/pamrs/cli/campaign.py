@@ -53,7 +53,9 @@ def campaign_command(
     ] = None,
     minutes: Annotated[float, typer.Option(help="Time at the bench.")] = 30.0,
     runs: Annotated[int, typer.Option(help="Runs at most.")] = 6,
-    air: Annotated[float, typer.Option(help="Litres of air at ambient pressure.")] = 1000.0,
+    air: Annotated[
+        float, typer.Option(help="Litres of air at ambient pressure, at most.")
+    ] = 1000.0,
     highest: Annotated[
         str | None, typer.Option(help="Pressure up to which experiments go, like '3 bar'.")
     ] = None,
@@ -72,6 +74,10 @@ def campaign_command(
     period: Annotated[
         str | None, typer.Option(help="Time between two commands, like '10 ms'.")
     ] = None,
+    unattended: Annotated[
+        bool,
+        typer.Option("--unattended", help="With --step: no experiment that takes hands."),
+    ] = False,
     baud: Annotated[int, typer.Option(help="Of a serial port.")] = 115200,
 ) -> None:
     """Diagnose, propose an experiment, play it, and again, until it is decided what is missing.
@@ -96,6 +102,7 @@ def campaign_command(
         rest={name: _number("rest", name, text) for name, text in _named("rest", rest)},
         highest=None if highest is None else exact("highest", highest, "pressure"),
         period=None if period is None else exact("period", period, "time"),
+        unattended=unattended,
     )
     with progress(f"campaign on {loaded.name}") as say:
         found = campaign(
