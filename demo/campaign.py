@@ -24,7 +24,6 @@ KINDS = {
     "leak_muscle": {"conductance": 6e-10},
     "valve_dead_zone": {},
     "muscle_hysteresis": {},
-    "pressure_lag": {},
 }
 ROOT = Path(__file__).parents[1]
 SAMPLE_TIME, SECONDS = 0.01, 30.0

@@ -190,8 +190,8 @@ def _other(case: _Case, arm: str, lengths: Sequence[float]) -> None:
     home = case.work / arm
     names, total = [FREE], 0.0
     home.mkdir(exist_ok=True)
-    for file in ("rig.toml", f"{FREE}.csv"):
-        write(home / file, (case.case / file).read_text(encoding="utf-8"))
+    for own in ("rig.toml", f"{FREE}.csv"):
+        write(home / own, (case.case / own).read_text(encoding="utf-8"))
     for count in range(RUNS + 1):
         if count:
             kind = STANDARD[count - 1] if arm == "standard" else "multisine"

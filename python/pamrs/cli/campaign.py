@@ -122,12 +122,12 @@ def campaign_command(
 def _device(name: str, rig: Rig, baud: int) -> Device:
     """The device that a text names."""
     if name.partition(":")[0] == _SIMULATED:
-        from pamrs.campaigns.simulated import SimulatedBench
+        from pamrs.campaigns import SimulatedBench
 
         plant = name.partition(":")[2]
         simulated: Device = SimulatedBench(rig_named(Path(plant)) if plant else rig)
         return simulated
-    from pamrs.campaigns.serial import SerialDevice
+    from pamrs.campaigns import SerialDevice
 
     return SerialDevice(name, baud=baud)
 
