@@ -174,7 +174,7 @@ def test_where_nothing_is_missing_what_was_not_seen_is_asked_for(rig, pool, diag
     found = campaign(SimulatedBench(rig), rig, before * 2, out=tmp_path, bench=FAST, budget=LIMITS)
     (step,) = found.steps
     assert step.name == "fast_triangle"
-    assert step.why == "It would show valve hysteresis at its usual size."
+    assert step.why == "It would show valve hysteresis at the usual size."
     assert found.why == "decided"
 
 

@@ -168,17 +168,22 @@ def is_healthy(diagnosis: Diagnosis) -> bool:
     return diagnosis.verdict in HEALTHY and not diagnosis.answer.names
 
 
-def is_open(diagnosis: Diagnosis | None, blind: Sequence[str], recordings: int) -> str:
-    """What is open, in words; empty where the diagnosis is decided."""
+def is_open(diagnosis: Diagnosis | None, recordings: int) -> str:
+    """What is open by a diagnosis of so many recordings, in words; empty where nothing is."""
     if diagnosis is None:
         return "nothing was recorded yet"
     if not diagnosis.answer.settled:
         return diagnosis.headline
     if recordings < 2:
         return "the answer rests on one recording, and has not predicted another one yet"
-    if is_healthy(diagnosis) and blind:
-        return f"these recordings would not show {_effects(blind)} at its usual size"
     return ""
+
+
+def not_shown(effects: Iterable[str]) -> str:
+    """What recordings would not show, in words; empty where there is nothing."""
+    return (
+        f"these recordings would not show {_effects(effects)} at the usual size" if effects else ""
+    )
 
 
 def proposed(
@@ -277,7 +282,7 @@ def _showing(
         return None
     shown = _shown_by(best, blind)
     if shown:
-        return Proposal(best, f"It would show {_effects(shown)} at its usual size.", False, rivals)
+        return Proposal(best, f"It would show {_effects(shown)} at the usual size.", False, rivals)
     if diagnosis is None or not diagnosis.answer.settled:
         why = "What is missing has no name yet: another motion shows what it depends on."
         return Proposal(best, why, False, rivals)

@@ -314,8 +314,8 @@ def sheet(step: Step, proposal: Proposal, commands: Commands) -> str:
     lines += [
         f"- Record time, every command and, as far as you have them, {', '.join(heard)}; headings "
         "with units, as `muscle_pressure [bar]`.",
-        "- Put the log into the folder of this sheet as `recording.csv`, and give the same command again (or "
-        "name it with `--recording FILE`).",
+        "- Put the log into the folder of this sheet as `recording.csv`, and give the same command "
+        "again (or name it with `--recording FILE`).",
         "",
         "**What it must show.** A model that is true leaves about one noise level of every "
         "channel, its values moved no farther than is known; `foretold.csv` has the curves.",

@@ -17,6 +17,7 @@ from pamrs.campaigns._choice import (
     asked_for,
     is_healthy,
     is_open,
+    not_shown,
     plan_of,
     pool_of,
     proposed,
@@ -227,14 +228,14 @@ class _Work:
         recordings, spent = self.recordings, self.folder.spent
         if self.found is None:
             self.diagnose()
-        wanted = self.wanted
-        what = is_open(self.found, list(wanted), len(recordings))
+        what = is_open(self.found, len(recordings)) or not_shown(self.wanted)
         headline = "" if self.found is None else self.found.headline
         if not what:
             return self.end("decided", f"Decided: {headline}")
         over = self.budget.passed(spent + Cost(runs=1))
         if over:
             return self.end("budget", f"The budget is used up ({over}); open is: {what}")
+        wanted = self.wanted
         pool = pool_of(
             self.commands,
             recordings,

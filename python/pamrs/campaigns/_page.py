@@ -73,7 +73,7 @@ def _open(after: dict[str, Any]) -> str:
         told.append("the answer is not settled")
     if after.get("unseen"):
         effects = listed([hypothesis_label(name) for name in after["unseen"]])
-        told.append(f"not to be seen at its usual size: {effects}")
+        told.append(f"even if there, not seen at the usual size: {effects}")
     return "; ".join(told) + "." if told else "Nothing."
 
 
