@@ -60,8 +60,8 @@ class Step:
         Files, from the folder of the campaign; the last one is complete where ``finished``.
     finished : bool
         Whether it was played to its end.
-    scores : dict of str to list
-        Of every rival the channel that it missed most, and by how many noise levels.
+    scores : dict of str to dict of str to float
+        What every rival left of each channel [noise levels].
     after : dict or None
         What was known with it.
     changed : bool or None
@@ -82,9 +82,21 @@ class Step:
     spent: list[float] = field(default_factory=list)
     recordings: list[str] = field(default_factory=list)
     finished: bool = False
-    scores: dict[str, Any] = field(default_factory=dict)
+    scores: dict[str, dict[str, float]] = field(default_factory=dict)
     after: dict[str, Any] | None = None
     changed: bool | None = None
+
+    @property
+    def telling(self) -> str:
+        """The channel in which what the rivals left differs most; empty before they are scored."""
+        every = list(self.scores.values())
+        common = set.intersection(*map(set, every)) if every else set()
+
+        def spread(channel: str) -> float:
+            left = [own[channel] for own in every]
+            return max(left) - min(left)
+
+        return max(sorted(common), key=spread, default="")
 
     @property
     def cost(self) -> Cost:
@@ -317,8 +329,8 @@ def sheet(step: Step, proposal: Proposal, commands: Commands) -> str:
         "- Put the log into the folder of this sheet as `recording.csv`, and give the same command "
         "again (or name it with `--recording FILE`).",
         "",
-        "**What it must show.** A model that is true leaves about one noise level of every "
-        "channel, its values moved no farther than is known; `foretold.csv` has the curves.",
+        "**What it must show.** A model that is true leaves one noise level of every channel and "
+        "its own error, its values moved no farther than is known; `foretold.csv` has the curves.",
         "",
         *(f"- {hypothesis_label(r['label'])} ({r['probability']:.2f})" for r in step.rivals),
     ]

@@ -327,8 +327,7 @@ class _Work:
         """Score what was foretold of a run, and diagnose with it."""
         rivals = self.folder.rivals(step)
         try:
-            scores = foretold(rivals, self.folder.recording(step), self.settings)
-            step.scores = {label: list(found) for label, found in scores.items()}
+            step.scores = foretold(rivals, self.folder.recording(step), self.settings)
         except (DiagnosisError, SimulationError):  # such a run tells nothing of these models alone
             step.scores = {}
         self.diagnose()

@@ -45,16 +45,14 @@ def _told(folder: Folder, step: Step) -> dict[str, Any]:
         {
             "name": hypothesis_label(own["label"]),
             "probability": format_probability(own["probability"]),
-            "left": f"{step.scores[own['label']][1]:.2g}" if own["label"] in step.scores else "",
-            "channel": spoken_name(step.scores[own["label"]][0])
-            if own["label"] in step.scores
-            else "",
+            "left": f"{step.scores[own['label']][step.telling]:.2g}" if step.telling else "",
         }
         for own in step.rivals
     ]
     return {
         **vars(step),
         "rivals": rivals,
+        "telling": spoken_name(step.telling) if step.telling else "run",
         "verdict": "" if step.changed else "This run changed nothing that counts.",
         "probabilities": [
             (hypothesis_label(name), *(format_probability(own.get(name)) for own in chances))

@@ -22,7 +22,7 @@ from pamrs.recordings import Recording
 
 def foretold(
     hypotheses: Sequence[Modelled], recording: Recording, settings: DiagnosisSettings | None = None
-) -> dict[str, tuple[str, float]]:
+) -> dict[str, dict[str, float]]:
     """What each hypothesis leaves of a recording that it was not fitted to, its parameters moved no
     farther than what was known of them before.
 
@@ -37,9 +37,9 @@ def foretold(
 
     Returns
     -------
-    dict of str to (str, float)
-        By label the channel that is missed most, and by how much: root mean square in bins
-        of 0.1 s, 1 where noise is all that is left [noise levels].
+    dict of str to dict of str to float
+        By label what is left of each channel: root mean square in bins of 0.1 s, 1 where noise is
+        all [noise levels].
 
     Raises
     ------
@@ -59,11 +59,9 @@ def foretold(
         left = misfit(problem, linear(problem, there), weights)
         # in bins as short as those of the fit a sensor's own noise is larger than in its level
         white = bins_of(prepared) / bin_width(prepared, FIT_BIN_TIME)
-        sizes = {
-            block: size / math.sqrt(1.0 + (white - 1.0) / weights[block, name] ** 2)
+        channels = {block.name: block.channel for block in problem.blocks}
+        found[label] = {
+            channels[block]: size / math.sqrt(1.0 + (white - 1.0) / weights[block, name] ** 2)
             for (block, name), size in left.rms.items()
         }
-        worst = max(sizes, key=lambda block: sizes[block])
-        channel = next(b.channel for b in problem.blocks if b.name == worst)
-        found[label] = (channel, sizes[worst])
     return found
