@@ -249,28 +249,28 @@ def trial_of_campaigns(
             say(f"{run_case(one)}: done")
 
 
-def state_of(key: dict[str, Any], result: dict[str, Any] | None) -> str:
-    """A result is right, wrong or open.
-
-    Open: it says that it is not settled. Right: all that it names is concealed, and something is
-    named where something with a name is; `unlisted` where what is missing has none; nothing where
-    nothing is. Without a result it is wrong.
+def is_right(key: dict[str, Any], result: dict[str, Any]) -> bool:
+    """Whether all that a result names is concealed, and something is named where something with a
+    name is; `unlisted` where what is missing has none; nothing where nothing is.
     """
-    if result is None:
-        return "wrong"
-    if not result["answer"]["settled"]:
-        return "open"
     truth = opened(key)
     said = {family(e["id"]) for e in result["effects"]} if result["verdict"] == "effects" else set()
     said |= {own["name"] for own in result["wrong_parameters"]}
     there = truth.names | set(truth.wrong)
     if there:
-        right = bool(said) and said <= there
-    elif truth.unlisted or key["verdict"] == "unlisted":
-        right = not said and result["verdict"] == "unlisted"
-    else:
-        right = not said and result["verdict"] in HEALTHY
-    return "right" if right else "wrong"
+        return bool(said) and said <= there
+    if truth.unlisted or key["verdict"] == "unlisted":
+        return not said and result["verdict"] == "unlisted"
+    return not said and result["verdict"] in HEALTHY
+
+
+def state_of(key: dict[str, Any], result: dict[str, Any] | None) -> str:
+    """A result is open where it says that it is not settled, else right or wrong; wrong without."""
+    if result is None:
+        return "wrong"
+    if not result["answer"]["settled"]:
+        return "open"
+    return "right" if is_right(key, result) else "wrong"
 
 
 def scored(out: Path, names: Sequence[str]) -> dict[str, list[dict[str, float]]]:
@@ -279,15 +279,17 @@ def scored(out: Path, names: Sequence[str]) -> dict[str, list[dict[str, float]]]
     for arm in ARMS:
         found[arm] = []
         for count in range(RUNS + 1):
-            states, seconds = [], []
+            states, seconds, leads = [], [], 0
             for name in names:
                 key = json.loads((out / "keys" / f"{name}.json").read_text(encoding="utf-8"))
                 file = out / "results" / name / f"{arm}_{count}.json"
                 if file.is_file():
                     told = json.loads(file.read_text(encoding="utf-8"))
                     states.append(state_of(key, told["result"]))
+                    leads += told["result"] is not None and is_right(key, told["result"])
                     seconds.append(float(told["seconds"]))
             row: dict[str, float] = {state: states.count(state) for state in STATES}
+            row["leads"] = leads
             row["seconds"] = float(np.mean(seconds)) if seconds else math.nan
             found[arm].append(row)
     return found
@@ -296,15 +298,19 @@ def scored(out: Path, names: Sequence[str]) -> dict[str, list[dict[str, float]]]
 def page(found: dict[str, list[dict[str, float]]], cases: int) -> str:
     """The scores as a table."""
     lines = [f"# Campaigns on the independent plant, {cases} cases", ""]
-    lines += ["| arm | runs | right | wrong | open | right, 95 % interval | s at the bench |"]
-    lines += ["|---|---:|---:|---:|---:|---|---:|"]
+    lines += [
+        "| arm | runs | right | wrong | open | right, 95 % interval | right, settled or not | "
+        "s at the bench |"
+    ]
+    lines += ["|---|---:|---:|---:|---:|---|---:|---:|"]
     for arm, rows in found.items():
         for count, row in enumerate(rows):
             n = int(sum(row[state] for state in STATES))
             low, high = wilson(int(row["right"]), n) if n else (0.0, 1.0)
             cells = " | ".join(f"{row[state]:.0f}" for state in STATES)
             lines.append(
-                f"| {arm} | {count} | {cells} | {low:.2f} to {high:.2f} | {row['seconds']:.0f} |"
+                f"| {arm} | {count} | {cells} | {low:.2f} to {high:.2f} | "
+                f"{row['leads']:.0f} | {row['seconds']:.0f} |"
             )
     return "\n".join(lines) + "\n"
 

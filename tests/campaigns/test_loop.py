@@ -11,6 +11,8 @@ import pytest
 import pamrs
 from pamrs._writing import write_atomically
 from pamrs.campaigns import Bench, Budget, _loop, campaign
+from pamrs.campaigns._bench import Commands
+from pamrs.campaigns._play import play
 from pamrs.campaigns.simulated import SimulatedBench
 from pamrs.control.live import LiveError
 from pamrs.diagnosis import DiagnosisSettings
@@ -269,6 +271,25 @@ def test_without_a_device_a_person_plays_it_and_brings_the_recording(
         campaign(None, *given, out=tmp_path, recording=home / "recording.csv")
 
 
+def test_a_payload_that_a_person_hung_on_is_known_in_its_recording(rig, pool, diagnosed, tmp_path):
+    one = pool["other_payload"]
+    diagnosed.answers += [
+        Found(rig, ask=asks(rig, pool, "other_payload")),
+        Found(rig, settled=True),
+    ]
+    given = (rig, log(rig, tmp_path, pool))
+    campaign(None, *given, out=tmp_path)
+    home = tmp_path / "step_01"
+    assert "arm.payload = 4.535" in (home / "sheet.md").read_text()
+    bench = SimulatedBench(rig.with_parameters(one.changes))
+    bench_commands = Commands(rig, FAST)
+    play(bench, bench_commands, protocol_of(one), tmp_path / "log.csv")
+    found = campaign(None, *given, out=tmp_path, recording=tmp_path / "log.csv")
+    (step,) = found.steps
+    # with its own payload the rig file's model leaves noise alone
+    assert max(step.scores["none"].values()) < 1.5
+
+
 def test_a_folder_of_another_rig_and_a_device_of_another_rig_are_refused(rig, diagnosed, tmp_path):
     diagnosed.answers.append(Found(rig, settled=True))
     other = SimpleNamespace(commands=("valve_command.left",), name="/dev/ttyACM0")
@@ -276,6 +297,8 @@ def test_a_folder_of_another_rig_and_a_device_of_another_rig_are_refused(rig, di
         ParameterError, match="device = /dev/ttyACM0 takes valve_command.left, which"
     ):
         campaign(other, rig, out=tmp_path)
+    with pytest.raises(ParameterError, match="no command that a device could play"):
+        campaign(other, pamrs.rigs.sealed_chamber(), out=tmp_path / "sealed")
     with pytest.raises(CaseError, match="holds the campaign of another rig"):
         campaign(None, rig.with_parameters({"arm.payload": 8.0}), out=tmp_path)
     (tmp_path / "campaign.json").write_text("{}")

@@ -19,6 +19,8 @@ from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._play import play
 from pamrs.campaigns.simulated import SimulatedBench
 from pamrs.control.live import LiveError
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.experiments import chains_of, library, protocol_of
 from pamrs.findings import Protocol
 from tests.simulation.refusals import refused
 
@@ -59,6 +61,28 @@ def test_what_is_recorded_is_what_happened(rig, tmp_path):
     # first and last the valve is closed; between them it vents, and then plays
     assert written(bench)[0] == written(bench)[-1] == 5.0
     assert written(bench)[1:51] == [3.75] * 50
+
+
+@pytest.mark.parametrize(
+    ("name", "commands"),
+    [
+        ("antagonistic_joint", ["valve_command.flexor", "valve_command.extensor"]),
+        ("regulated_joint", ["supply_command"]),
+    ],
+)
+def test_every_command_of_a_rig_is_played_and_recorded(name, commands, tmp_path):
+    rig, path = pamrs.rigs.named(name), tmp_path / "run.csv"
+    (one,) = library(rig, DiagnosisSettings(), sample_time=PERIOD, only=["fast_triangle"])
+    bench = SimulatedBench(rig)
+    play(bench, Commands(rig, Bench(settle=1.0)), protocol_of(one), path)
+    recording = pamrs.load_recording(path)
+    assert list(one.commands) == commands
+    for channel in commands:
+        assert recording.channels[channel] == pytest.approx(one.commands[channel], rel=1e-6)
+    alone = one.simulate(rig)
+    for chain in chains_of(rig):
+        apart = recording.channels[chain.pressure] - alone[chain.pressure]
+        assert np.sqrt(np.mean(apart**2)) < 0.02 * np.ptp(alone[chain.pressure])
 
 
 class Broken(SimulatedBench):
@@ -191,6 +215,8 @@ from pathlib import Path
 from pamrs.campaigns import Bench
 from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._play import play
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.experiments import chains_of, library, protocol_of
 from pamrs.findings import Protocol
 class Still:
     clock = None

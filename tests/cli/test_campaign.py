@@ -41,6 +41,8 @@ def test_it_ends_with_its_budget_and_says_where_its_pages_are(run, tmp_path):
     home = tmp_path / "out"
     code, out, _ = run(*WORDS, str(home), "--device", "simulated", "--runs", "0")
     assert code == 0
-    assert "The budget is used up (1 of 0 runs); open is: nothing was recorded yet" in out
+    assert (
+        "The budget allows no further run (1 of 0 runs); open is: nothing was recorded yet" in out
+    )
     assert f"Pages: {home / 'campaign.html'}" in out
-    assert "The budget is used up" in (home / "campaign.html").read_text()
+    assert "The budget allows no further run" in (home / "campaign.html").read_text()

@@ -20,14 +20,14 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1109,
-    "campaigns": 1065,
+    "campaigns": 1092,
     "cli": 1419,
     "control": 4596,
     "design": 530,
-    "diagnosis": 10996,
+    "diagnosis": 11020,
     "effects": 404,
     "experiments": 1052,
-    "findings": 945,
+    "findings": 947,
     "fit": 2937,
     "library": 71,
     "recordings": 4864,
@@ -40,15 +40,15 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 26686,
+    "tests": 27202,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
-    "trial": 5368,
-    "trial/tests": 1144,
+    "trial": 5667,
+    "trial/tests": 1198,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35841
+MOST = 37016
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

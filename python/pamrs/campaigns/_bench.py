@@ -15,6 +15,7 @@ from pamrs.channels import channel_of, unit_of
 from pamrs.errors import ParameterError
 from pamrs.experiments import Experiment, chains_of
 from pamrs.rig import Rig
+from pamrs.simulation import has_frame
 
 _VENTING: Final = 0.25  # opening by which a valve vents before a run: seconds, and no arm drops
 _MORE: Final = 1.2  # times the highest pressure of a rig that a gauge may show
@@ -36,8 +37,9 @@ class Bench:
     safe : mapping of str to float
         What is written first and last [SI]: by default valves closed, regulators at 0 Pa.
     rest : mapping of str to float
-        What brings the rig to where experiments begin [SI]: by default valves vent by a quarter of
-        their opening, and regulators are set to what they begin with.
+        What brings the rig to where experiments begin [SI]: by default valves, open by a quarter at
+        most, vent their chambers, or bring them to ``initial_pressure`` of the rig file, and
+        regulators are set to what they begin with.
     settle : float
         How long that is written before each run [s].
     highest : float, optional
@@ -78,6 +80,8 @@ class Commands:
         Of every command what is safe, its lowest and its highest value [SI].
     rest : dict of str to float
         What is written before a run [SI].
+    begins : dict of str to ((str, ...), float)
+        Of every pressure that valves move these, and the pressure that a run begins at [Pa].
 
     Raises
     ------
@@ -89,6 +93,7 @@ class Commands:
         self.rig, self.bench = rig, bench
         positive("settle", bench.settle, zero=True)
         names = [name for chain in chains_of(rig) for name in chain.commands]
+        names += ["length"] if has_frame(rig) else []
         for what in ("limits", "safe", "rest"):
             for name in getattr(bench, what):
                 if name not in names:
@@ -108,6 +113,12 @@ class Commands:
             self.rest[name] = checked_number(
                 f"rest[{name!r}]", bench.rest.get(name, rest), low, high, unit
             )
+
+        self.begins = {
+            chain.pressure: (chain.commands, chain.before(rig))
+            for chain in chains_of(rig)
+            if chain.valves and not set(chain.commands) & set(bench.rest)
+        }
 
     @property
     def safe(self) -> dict[str, float]:
@@ -138,7 +149,9 @@ class Commands:
         """Which command of an experiment is not allowed, in words; empty where all are."""
         for name, values in experiment.commands.items():
             if name not in self.ranges:
-                return f"it commands {name}, which no valve or regulator of the rig takes"
+                return (
+                    f"it commands {name}, and the rig takes {', '.join(self.ranges) or 'nothing'}"
+                )
             _, low, high = self.ranges[name]
             least, most = float(np.min(values)), float(np.max(values))
             slack = _SAME * max(abs(low), abs(high))
@@ -158,6 +171,10 @@ def _usual(rig: Rig, name: str) -> tuple[float, float, float, float]:
         table = rig.tables("valve")[block]
         null, half = float(table["null_voltage"]), float(table["half_range"])
         return null, null - half, null + half, null - _VENTING * half
+    if kind == "length":  # of a load frame, which leaves the muscle long
+        table = rig.tables("load")[""]
+        low, high = float(table["min_length"]), float(table["max_length"])
+        return high, low, high, high
     begins = 0.0
     if kind == "supply_command":
         begins = float(rig.tables("supply")[block]["initial_pressure"])

@@ -5,7 +5,7 @@ same command goes on after any stop.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,7 +22,7 @@ from pamrs.diagnosis.next_experiment import measurable
 from pamrs.errors import CaseError, SimulationError
 from pamrs.experiments import protocol_of
 from pamrs.findings import Protocol, to_plain
-from pamrs.recordings import Recording, load_recording
+from pamrs.recordings import OwnValue, Recording, load_recording
 from pamrs.report.text import hypothesis_label
 from pamrs.rig import Rig, load_rig
 
@@ -48,6 +48,8 @@ class Step:
         Whether it was played before.
     seconds, litres : float
         What one run takes [s], [l].
+    changes : dict of str to float
+        Parameters of the rig that a person changed for it [SI].
     rivals : list of dict
         What predicted it: ``label``, ``probability``, ``model`` (its file).
     before : dict or None
@@ -76,6 +78,7 @@ class Step:
     repeats: bool
     seconds: float
     litres: float
+    changes: dict[str, float] = field(default_factory=dict)
     rivals: list[dict[str, Any]] = field(default_factory=list)
     before: dict[str, Any] | None = None
     bits: float | None = None
@@ -195,7 +198,12 @@ class Folder:
         ambient = float(self.rig.tables("gas")[""]["ambient_pressure"])
         name = f"{step.number:02d} {step.name}"
         file = self.path / step.recordings[-1]
-        return load_recording(file, name=name, ambient_pressure=ambient)
+        found = load_recording(file, name=name, ambient_pressure=ambient)
+        changed = {
+            name: OwnValue(value, self.rig.parameter(name).value)
+            for name, value in step.changes.items()
+        }
+        return replace(found, parameters=changed)
 
     def next_file(self, step: Step, ending: str = ".csv") -> Path:
         """Where the next recording of a step goes."""
@@ -227,6 +235,7 @@ class Folder:
             proposal.repeats,
             cost.seconds,
             cost.litres,
+            dict(one.changes),
             before=before,
             bits=proposal.bits,
         )

@@ -164,6 +164,11 @@ class _Work:
         if not isinstance(case, Case):
             case = Case(rig.name, rig, list(case or ()), folder.path)
         self.before: list[Recording] = case.recordings
+        if device is not None and not self.commands.ranges:
+            raise ParameterError(
+                f"device = {getattr(device, 'name', device)} is not allowed: rig {rig.name!r} has "
+                "no command that a device could play; None (--step) is needed"
+            )
         taken = getattr(device, "commands", None)
         if taken is not None and set(taken) != set(self.commands.ranges):
             raise ParameterError(
@@ -234,7 +239,7 @@ class _Work:
             return self.end("decided", f"Decided: {headline}")
         over = self.budget.passed(spent + Cost(runs=1))
         if over:
-            return self.end("budget", f"The budget is used up ({over}); open is: {what}")
+            return self.end("budget", f"The budget allows no further run ({over}); open is: {what}")
         wanted = self.wanted
         pool = pool_of(
             self.commands,

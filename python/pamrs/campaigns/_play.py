@@ -18,11 +18,12 @@ from pamrs.control.live import Clock, Device, LiveError, SystemClock, run_live
 from pamrs.control.trajectories import step
 from pamrs.diagnosis.next_experiment import measurable
 from pamrs.errors import ParameterError
-from pamrs.experiments import chains_of
 from pamrs.findings import Protocol
 
 _LOST: Final = 0.1  # [s] without a usable reading after which a device is stopped
 _RISEN: Final = 5e4  # [Pa] by which a pressure may rise while its valve is told to vent
+_EMPTY: Final = 2e3  # [Pa] below which a chamber begins empty, and its valve vents all the time
+_GAP: Final = 2e4  # [Pa] from which on a valve opens by a quarter before a run
 
 
 class _Player(Controller):
@@ -44,12 +45,7 @@ class _Player(Controller):
             name: own.get(name, np.full(count, safe)) for name, safe in commands.safe.items()
         }
         self.rows = self.lead + count
-        vented = [chain for chain in chains_of(commands.rig) if chain.valves]
-        self._vented = {
-            chain.pressure: chain.commands
-            for chain in vented
-            if all(self.rest[name] < self.command_ranges[name][0] for name in chain.commands)
-        }
+        self.begins = commands.begins
         self.recorder: Recorder | None = None
         self.reset()
 
@@ -63,23 +59,36 @@ class _Player(Controller):
         k = round(time / self.period) - self.lead
         fresh, self._last = measurement is not self._last, measurement
         if k < 0:
-            self._check_sign(measurement)
-            return self.rest
+            return self._resting(measurement)
         if self.recorder is not None and fresh:
             self.recorder.due = measurement
         return {name: float(values[k]) for name, values in self.sent.items()}
 
-    def _check_sign(self, measurement: Mapping[str, float]) -> None:
-        """Refuse a rig that fills while it is told to vent."""
-        self._before = self._before or dict(measurement)
-        for name, valves in self._vented.items():
-            now, then = measurement.get(name, 0.0), max(self._before.get(name, 0.0), 0.0)
-            if now > then + _RISEN:
-                told = ", ".join(f"{valve} = {self.rest[valve]:.4g} V" for valve in valves)
+    def _resting(self, measurement: Mapping[str, float]) -> dict[str, float]:
+        """Commands that bring every pressure to where a run begins.
+
+        Raises
+        ------
+        ParameterError
+            If a pressure rises while its valves are told to vent.
+        """
+        self._before, sent = self._before or dict(measurement), dict(self.rest)
+        for name, (valves, begin) in self.begins.items():
+            now = measurement.get(name, begin)
+            gap = -1.0
+            if begin > _EMPTY:
+                gap = min(max((begin - now) / _GAP, -1.0), 1.0)
+                for valve in valves:
+                    null = self.command_ranges[valve][0]
+                    sent[valve] = null + gap * (null - self.rest[valve])
+            then = max(self._before.get(name, 0.0), begin)
+            if gap < 0.0 and now > then + _RISEN:
+                told = ", ".join(f"{valve} = {sent[valve]:.4g} V" for valve in valves)
                 raise ParameterError(
                     f"{told} vents by the rig file, and {name} rose from {then:.4g} to {now:.4g} "
                     "Pa: the sign of the command is wrong, or the ports of the valve are swapped"
                 )
+        return sent
 
     @property
     def state(self) -> dict[str, Any]:

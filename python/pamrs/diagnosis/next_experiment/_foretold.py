@@ -31,7 +31,7 @@ def foretold(
     hypotheses : sequence of (label, rig, probability)
         Rigs as fitted, with their effects.
     recording : Recording
-        Of the same rig.
+        Of the same rig; parameters that had another value in it have that.
     settings : DiagnosisSettings, optional
         How it is made ready; the published ones by default.
 
@@ -51,12 +51,11 @@ def foretold(
     chosen = DiagnosisSettings() if settings is None else settings
     found = {}
     for label, rig, _ in hypotheses:
-        there = recording.rig_there(rig)
-        own = tuple(name for name in measurable(there) if name in recording.channels)
-        prepared = prepare(recording, there, chosen)
-        problem = problem_of(there, [prepared], own, chosen)
-        weights = weights_of(problem, there)
-        left = misfit(problem, linear(problem, there), weights)
+        own = tuple(name for name in measurable(rig) if name in recording.channels)
+        prepared = prepare(recording, rig, chosen)
+        problem = problem_of(rig, [prepared], own, chosen)
+        weights = weights_of(problem, rig)
+        left = misfit(problem, linear(problem, rig), weights)
         # in bins as short as those of the fit a sensor's own noise is larger than in its level
         white = bins_of(prepared) / bin_width(prepared, FIT_BIN_TIME)
         channels = {block.name: block.channel for block in problem.blocks}
