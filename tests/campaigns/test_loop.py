@@ -3,6 +3,9 @@ what follows from them is asked.
 """
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +13,7 @@ import pytest
 
 import pamrs
 from pamrs._writing import write_atomically
-from pamrs.campaigns import Bench, Budget, _loop, campaign
+from pamrs.campaigns import Bench, Budget, _choice, _loop, campaign
 from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._play import play
 from pamrs.campaigns.simulated import SimulatedBench
@@ -39,8 +42,10 @@ class Found:
 
     def __init__(self, rig, settled=False, probability=0.5, ask=None, limits=()):
         self.rig, self.verdict, self.limits = rig, "effects", list(limits)
-        names = ("leak_muscle",)
-        self.answer = SimpleNamespace(settled=settled, names=names, probability=probability)
+        self.answer = SimpleNamespace(
+            settled=settled, names=("leak_muscle",), probability=probability, why="sets"
+        )
+        self.wrong_parameters = []
         self.ambiguity = [] if settled else [["leak_muscle"], ["supply_leak"]]
         self.probabilities = {"leak_muscle": probability, "supply_leak": 1.0 - probability}
         self.headline = "A leak" if settled else "A leak of the muscle or of the supply"
@@ -172,7 +177,7 @@ def test_where_nothing_is_missing_what_was_not_seen_is_asked_for(rig, pool, diag
     )
     blind, healthy = Found(rig, settled=True, limits=[hidden]), Found(rig, settled=True)
     for one in (blind, healthy):
-        one.verdict, one.answer.names = "none", ()
+        one.verdict, one.answer.names = "none", ("none",)
     diagnosed.answers += [blind, healthy]
     before = log(rig, tmp_path, pool)
     found = campaign(SimulatedBench(rig), rig, before * 2, out=tmp_path, bench=FAST, budget=LIMITS)
@@ -191,6 +196,28 @@ def test_a_settled_answer_of_one_recording_has_to_predict_another(rig, pool, dia
     found = campaign(SimulatedBench(rig), *given, out=tmp_path, bench=FAST, budget=LIMITS)
     assert [step.name for step in found.steps] == ["fast_triangle"]
     assert found.why == "decided"
+
+
+def test_where_no_allowed_experiment_parts_the_rivals_it_says_so(
+    rig, pool, diagnosed, tmp_path, monkeypatch
+):
+    rivals = [("leak_muscle", rig, 0.5), ("supply_leak", rig, 0.5)]
+    ask = asks(rig, pool, "fast_triangle", hypotheses=rivals, expected_information_bits=0.01)
+    compared = []
+
+    def propose(nominal, hypotheses, *given, experiments, **others):
+        compared.append(sorted(one.name for one in experiments))
+        return ask
+
+    monkeypatch.setattr(_choice, "propose", propose)
+    diagnosed.answers.append(Found(rig, ask=ask))
+    given = (rig, log(rig, tmp_path, pool))
+    found = campaign(SimulatedBench(rig), *given, out=tmp_path, bench=FAST, budget=LIMITS)
+    assert (found.why, found.steps) == ("nothing parts", [])
+    assert "No allowed experiment parts what is left: A leak of the muscle or of" in found.text
+    # only what a device can play alone was compared
+    assert "multisine" in compared[0]
+    assert not {"other_payload", "free_decay", "holds_both_sides"} & set(compared[0])
 
 
 @pytest.mark.parametrize(
@@ -308,23 +335,16 @@ def test_a_folder_of_another_rig_and_a_device_of_another_rig_are_refused(rig, di
 
 @pytest.mark.slow
 def test_a_leak_is_found_from_one_poor_log(tmp_path):
-    """The whole of it, nothing stood in for."""
-    rig = pamrs.rigs.hanging_mass()
-    plant = rig.with_effect("leak_muscle", {"conductance": 2e-10})
-    (short,) = library(rig, DiagnosisSettings(), sample_time=0.02, only=["step_and_shut"])
-    bench = SimulatedBench(plant, seed=3)
-    run = short.simulate(plant)
-    names = ("valve_command", "supply_pressure", "muscle_pressure", "length")
-    random = np.random.default_rng(4)
-    noise = {
-        "supply_pressure": 400.0,
-        "muscle_pressure": 400.0,
-        "length": 3e-5,
-        "valve_command": 0.0,
-    }
-    table = {name: run[name] + random.normal(0.0, noise[name], len(run.time)) for name in names}
-    case = pamrs.Case.from_arrays(rig, {"free": table}, sample_time=0.02)
-    found = campaign(bench, rig, case, out=tmp_path, bench=FAST, budget=Budget(20, 3, 2000))
-    assert found.why == "decided", found.text
-    assert found.steps
-    assert [effect.id for effect in found.diagnosis.effects] == ["leak_muscle"]
+    """The whole of it as ``make campaign`` runs it, nothing stood in for."""
+    root = Path(__file__).parents[2]
+    words = ["--kind", "leak_muscle", "--seed", "7", "--out", str(tmp_path / "out")]
+    script = [sys.executable, str(root / "demo" / "campaign.py"), *words]
+    done = subprocess.run(script, cwd=root, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "concealed: leak_muscle\n   named:     leak_muscle" in done.stdout
+    kept = json.loads((tmp_path / "out" / "campaign" / "campaign.json").read_text())
+    assert kept["ended"]["why"] == "decided"
+    # the run that proves it was foretold by the leak, and by no rig without it
+    scores = kept["steps"][0]["scores"]
+    assert scores["leak_muscle"]["muscle_pressure"] < 2.0
+    assert scores["none"]["muscle_pressure"] > 5.0

@@ -15,7 +15,7 @@ from pamrs.campaigns._budget import Budget, Cost, cost_of
 from pamrs.channels import channel_of
 from pamrs.diagnosis import Diagnosis, DiagnosisSettings
 from pamrs.diagnosis.next_experiment import Plan, measurable, plan_diagnosis, propose
-from pamrs.effects import NONE
+from pamrs.effects import NONE, UNLISTED
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.experiments import Experiment, experiments_of, library
 from pamrs.findings import HEALTHY, NextExperiment
@@ -24,6 +24,7 @@ from pamrs.report.text import hypothesis_label, listed, spoken_name
 from pamrs.rig import Rig
 
 _LEAST_BITS: Final = 0.05  # [bit] below which an experiment parts nothing
+_LEAST_NOISES: Final = 1.0  # [noise levels] below which a pair is not told apart
 _LEVELS: Final = 0.1  # share by which numbers of an experiment may differ and be the same
 _BY_HAND: Final = 1.0  # [s] of effort beyond its length from which an experiment takes hands
 
@@ -165,7 +166,7 @@ def unseen(diagnosis: Diagnosis) -> list[str]:
 
 def is_healthy(diagnosis: Diagnosis) -> bool:
     """Whether nothing is missing, and no value is wrong, by a diagnosis."""
-    return diagnosis.verdict in HEALTHY and not diagnosis.answer.names
+    return diagnosis.verdict in HEALTHY and not diagnosis.wrong_parameters
 
 
 def is_open(diagnosis: Diagnosis | None, recordings: int) -> str:
@@ -207,7 +208,7 @@ def proposed(
         found = _parting(rig, own, allowed, recordings, settings)
         if found is not None:
             return replace(found, repeats=repeat)
-        if repeat:
+        if repeat or not _is_nameless(diagnosis):
             return None
     if not any(label == str(NONE) for label, _, _ in rivals):
         rivals.append((str(NONE), rig, 0.0 if rivals else 1.0))  # what the rig file says
@@ -217,10 +218,16 @@ def proposed(
         name = next(iter(allowed), "")
         why = "The same once more: whether it comes out alike says what chance leaves."
         return Proposal(allowed[name], why, repeat, rivals) if name else None
-    told = next((pair for pair in own.pairs if pair.experiment in allowed), None)
+    parting = (pair for pair in own.pairs if pair.noises is None or pair.noises >= _LEAST_NOISES)
+    told = next((pair for pair in parting if pair.experiment in allowed), None)
     if told is not None:
         return Proposal(allowed[told.experiment], told.text, repeat, rivals)
     return _showing(diagnosis, allowed, blind, rivals)
+
+
+def _is_nameless(diagnosis: Diagnosis) -> bool:
+    """Whether something is missing that has no name, or that no model with one explains."""
+    return diagnosis.verdict == UNLISTED.rest or diagnosis.answer.why == "missed"
 
 
 def _parting(
