@@ -48,7 +48,7 @@ export MPLBACKEND := Agg
 export PYTHONDONTWRITEBYTECODE :=
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
+.PHONY: FORCE help setup build demo campaign prove test test-all checks lint lint-rust lint-python test-rust test-python \
         test-python-all wheel wheel-test snapshots hostile logs fuzz deny format bench convergence recruitment \
         docs effects reference reproduce example golden lock clean
 
@@ -99,6 +99,9 @@ build: $(VENV)/.built $(VENV)/.installed  ## the same with what tests and checks
 
 demo: setup  ## conceal an effect, diagnose it, open the key (KIND=leak_muscle SEED=7 to choose)
 	@$(BIN)/python demo/run.py $(CASE_KIND) $(CASE_SEED)
+
+campaign: setup  ## conceal an effect, record one poor log, let a campaign find it (KIND=leak_muscle SEED=7 to choose)
+	@$(BIN)/python demo/campaign.py $(CASE_KIND) $(CASE_SEED)
 
 # Each stage goes on where it was stopped. Exit code 3: some case could not be diagnosed, which the page says.
 prove: build  ## blinded trial from cases to prove_out/proof/trial.md, hours (SEED=7 CASES=12 JOBS=2 FOLDER=prove_out to choose)

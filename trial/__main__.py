@@ -1,5 +1,5 @@
 """Command line of the trial: ``python -m trial write``, ``prove``, ``score``, ``pool``, ``insert``,
-``make`` and ``selfcheck``.
+``make``, ``campaign`` and ``selfcheck``.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from .campaign import draw, scored, specs_of_campaigns, trial_of_campaigns
+from .campaign import page as campaign_page
 from .concealed import make_case, write
 from .design import PLANS, ROUND, SECOND, specs
 from .effects import KINDS
@@ -38,6 +40,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     for add in (_add_write, _add_prove, _add_score, _add_pool, _add_insert, _add_make):
         add(commands.add_parser)
+    _add_campaign(commands.add_parser)
     _add_selfcheck(commands.add_parser)
     return parser
 
@@ -254,6 +257,33 @@ def _make(args: argparse.Namespace) -> None:
             rig=args.rig,
             publish=publish,
         )
+
+
+def _add_campaign(add: Add) -> None:
+    whole = add(
+        "campaign",
+        help="campaigns from one free log, against multisines and a fixed protocol; goes on where "
+        "it was stopped",
+    )
+    whole.add_argument("folder", type=Path, help="gets cases/, keys/, results/, campaign.md, .svg")
+    whole.add_argument("--seed", type=int, required=True)
+    whole.add_argument("--cases", type=int, default=24, help="default 24")
+    whole.add_argument("--jobs", type=int, default=1, help="cases at a time (default 1)")
+    whole.set_defaults(run=_campaign)
+
+
+def _campaign(args: argparse.Namespace) -> None:
+    if args.cases < 1 or args.jobs < 1:
+        raise ValueError("--cases and --jobs must be at least 1")
+
+    def told(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    trial_of_campaigns(args.folder, args.seed, args.cases, args.jobs, told)
+    names = [spec.name for spec in specs_of_campaigns(args.seed, args.cases)]
+    found = scored(args.folder, names)
+    draw(found, args.folder / "campaign.svg")
+    _shown(campaign_page(found, len(names)), args.folder / "campaign.md")
 
 
 def _add_selfcheck(add: Add) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -147,12 +147,26 @@ def _wrong_left(bench: Bench, name: str, model: dict[str, Any]) -> dict[str, flo
     return bench.left(plain, (name,))
 
 
-def make(spec: Spec) -> Case:
-    """Make one case in memory; the same spec gives the same bytes."""
-    model, kind = stated(spec.rig)[0], RIGS[spec.rig]
+@dataclass(frozen=True)
+class Concealed:
+    """What a case conceals: the recordings of its plant, effects with what the key says of them,
+    model errors, by how many tolerances values are off, and what effects were made smaller by.
+    """
+
+    bench: Bench
+    effects: list[Acting]
+    told: list[dict[str, Any]]
+    errors: list[Any]
+    moved: dict[str, float]
+    wrong: dict[str, float]
+    together: float
+
+
+def concealed(spec: Spec) -> Concealed:
+    """Draw what a case conceals; the same for the same spec."""
+    kind = RIGS[spec.rig]
     noise = noise_of(spec.lab, kind, np.random.default_rng([spec.seed, 20260701]))
     bench, moved, wrong = _baseline(spec, noise)
-    true = bench.true
     effects, told = _chosen(spec, bench, np.random.default_rng([spec.seed, 20260702]))
     gear = not {"tendon_compliance", "moment_arm_error"} & {e.id for e in effects}
     weight = bench.par.weight if "muscle" in kind.blocks else 0.0
@@ -160,6 +174,15 @@ def make(spec: Spec) -> Case:
     erring: Any = pair_errors if spec.rig == PAIR else model_errors
     errors: list[Any] = erring(kind, spec.percent, weight, own, gear)
     effects, errors, shrunk = _survives(bench, effects, errors)
+    return Concealed(bench, effects, told, errors, moved, wrong, shrunk)
+
+
+def make(spec: Spec) -> Case:
+    """Make one case in memory; the same spec gives the same bytes."""
+    model, kind = stated(spec.rig)[0], RIGS[spec.rig]
+    drawn = concealed(spec)
+    bench, effects, told, errors = drawn.bench, drawn.effects, drawn.told, drawn.errors
+    wrong, true = drawn.wrong, drawn.bench.true
     records = bench.run([*effects, *errors])
     terms = _terms(bench, told, effects, errors, wrong, model)
     files, lost = _tables(spec, bench, records)
@@ -170,7 +193,7 @@ def make(spec: Spec) -> Case:
         "spec": spec.to_dict(),
         "verdict": _verdict(spec, errors),
         "effects": told,
-        "together": shrunk,
+        "together": drawn.together,
         "model_error": {
             "percent": spec.percent,
             "stated": spec.stated,
@@ -185,8 +208,8 @@ def make(spec: Spec) -> Case:
             for name, z in wrong.items()
         },
         "terms": terms,
-        "moved_tolerances": moved,
-        "noise": asdict(noise),
+        "moved_tolerances": drawn.moved,
+        "noise": asdict(bench.noise),
         "lost": lost,
     }
     files = {

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from pamrs import (
+        campaigns,
         channels,
         control,
         design,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
         sweeps,
         units,
     )
+    from pamrs.campaigns import campaign
     from pamrs.design import sizing
     from pamrs.diagnosis import diagnose, missing_input
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
@@ -84,6 +86,8 @@ __all__ = [
     "SimulationError",
     "Simulator",
     "__version__",
+    "campaign",
+    "campaigns",
     "channels",
     "control",
     "design",
@@ -113,6 +117,7 @@ __all__ = [
 ]
 
 _NAMES: Final = {
+    "campaigns": ("campaign",),
     "design": ("sizing",),
     "diagnosis": ("diagnose", "missing_input"),
     "diagnosis.next_experiment": ("Plan", "plan_diagnosis"),

@@ -38,6 +38,7 @@ LAYERS = (
     ("control", "design"),
     ("sweeps",),
     ("diagnosis",),
+    ("campaigns",),
     ("studio",),
     ("cli",),
 )

@@ -20,14 +20,15 @@ ROOT = Path(__file__).parents[2]
 
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
-    ".": 1108,
-    "cli": 1363,
+    ".": 1109,
+    "campaigns": 1097,
+    "cli": 1419,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11019,
+    "diagnosis": 11043,
     "effects": 404,
     "experiments": 1052,
-    "findings": 945,
+    "findings": 947,
     "fit": 2937,
     "library": 71,
     "recordings": 4864,
@@ -40,15 +41,15 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 26685,
+    "tests": 27216,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
-    "trial": 5368,
-    "trial/tests": 1144,
+    "trial": 5667,
+    "trial/tests": 1198,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35864
+MOST = 37044
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

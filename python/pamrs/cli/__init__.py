@@ -19,6 +19,7 @@ import typer
 
 from pamrs.cli._shared import with_quiet
 from pamrs.cli._streams import guarded
+from pamrs.cli.campaign import campaign_command
 from pamrs.cli.compare import compare_command
 from pamrs.cli.completion import VARIABLE, completion_command
 from pamrs.cli.design import design_app
@@ -68,6 +69,7 @@ _COMMANDS: Final[dict[str, Callable[..., None]]] = {
     "studio": studio_command,
     "compare": compare_command,
     "diagnose": diagnose_command,
+    "campaign": campaign_command,
 }
 for _name, _group in _GROUPS.items():
     app.add_typer(_group, name=_name)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pamrs._arrays import Array
-from pamrs.findings._entry import NOT_WRITTEN, Entry
+from pamrs.findings._entry import NOT_WRITTEN, OPTIONAL, Entry
 
 DETECTED = 3.86
 """Signature left [standard deviations] that is detected in 90 %, with 1 % of false alarms."""
@@ -239,6 +239,10 @@ class NextExperiment(Entry):
         The commands; None where nothing is sent, or no experiment is proposed.
     instruction : str
         What to record, whole; empty where nothing is to be recorded.
+    hypotheses : list of (str, model, float)
+        What was left and has a model: label, rig as fitted, probability.
+    noise : dict of str to float
+        Sample noise of the recordings by channel [SI].
     """
 
     text: str = ""
@@ -247,8 +251,10 @@ class NextExperiment(Entry):
     ranking: list[RankedExperiment] = field(default_factory=list, metadata=NOT_WRITTEN)
     curves: Curves | None = field(default=None, metadata=NOT_WRITTEN)
     pairs: list[PairExperiment] = field(default_factory=list)
-    protocol: Protocol | None = field(default=None, metadata=NOT_WRITTEN)
+    protocol: Protocol | None = field(default=None, metadata=OPTIONAL)
     instruction: str = ""
+    hypotheses: list[tuple[str, Any, float]] = field(default_factory=list, metadata=NOT_WRITTEN)
+    noise: dict[str, float] = field(default_factory=dict, metadata=NOT_WRITTEN)
 
 
 @dataclass(frozen=True, eq=False)

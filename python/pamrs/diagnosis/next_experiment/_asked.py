@@ -247,11 +247,9 @@ def next_to_record(
         simulated = None  # of what is open one has a model
     known = simulated.pairs if simulated is not None else []
     pairs = _pairs(asked, ambiguity, hypotheses, known)
-    if simulated is not None:
-        return replace(simulated, pairs=pairs)
-    if same:
-        return NextExperiment(same, pairs=pairs)
-    return replace(_without_models(asked, diagnosis), pairs=pairs)
+    if simulated is None:
+        simulated = NextExperiment(same) if same else _without_models(asked, diagnosis)
+    return replace(simulated, pairs=pairs, hypotheses=list(hypotheses), noise=asked.noise)
 
 
 def _first_asked(answer: Answer) -> Part | None:

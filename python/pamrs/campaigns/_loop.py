@@ -1,0 +1,354 @@
+"""A campaign: diagnose, propose, foretell, play, score, and again, until it is decided."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pamrs.campaigns._bench import Bench, Commands
+from pamrs.campaigns._budget import Budget, Cost
+from pamrs.campaigns._choice import (
+    Pool,
+    Proposal,
+    asked_for,
+    is_healthy,
+    is_open,
+    not_shown,
+    plan_of,
+    pool_of,
+    proposed,
+    shows_of,
+    unseen,
+)
+from pamrs.campaigns._folder import Folder, Step, told
+from pamrs.campaigns._page import write_pages
+from pamrs.campaigns._play import play
+from pamrs.control.live import Device
+from pamrs.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from pamrs.diagnosis.next_experiment import foretold
+from pamrs.errors import CaseError, DiagnosisError, ParameterError, SimulationError
+from pamrs.recordings import Case, Recording, load_case
+from pamrs.rig import Rig
+
+_MOVED: Final = 0.05  # of a probability, from which on a run changed something
+_UNCHANGED: Final = 2  # runs in a row that changed nothing, after which the kind is not asked again
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """A campaign as far as it went.
+
+    Attributes
+    ----------
+    path : Path
+        Its folder: ``campaign.json``, ``campaign.html``, ``result.json`` of the last diagnosis, and
+        a folder for each step.
+    diagnosis : Diagnosis or None
+        The last one that this call made: with ``no recording`` there may be none, and
+        ``result.json`` in the folder has the one before.
+    steps : list of Step
+        What was proposed, foretold, played and found.
+    why : str
+        Why it ended: ``decided``, ``budget``, ``nothing parts`` (no allowed experiment parts what
+        is left), ``unchanged`` (two runs changed nothing, and a repeat neither), ``no recording``
+        (a step waits for one).
+    text : str
+        The same in words, with what would help.
+    """
+
+    path: Path
+    diagnosis: Diagnosis | None
+    steps: list[Step]
+    why: str
+    text: str
+
+    def summary(self) -> str:
+        """What each run changed, and what is open, as text."""
+        lines = [f"{len(self.steps)} steps in {self.path}"]
+        for step in self.steps:
+            after = step.after["headline"] if step.after else "waits for its recording"
+            lines.append(f"  {step.number}  {step.name}{' again' * step.repeats}: {after}")
+        return "\n".join([*lines, self.text])
+
+
+def campaign(
+    device: Device | None,
+    rig: Rig,
+    case: Case | Sequence[Recording] | str | os.PathLike[str] | None = None,
+    *,
+    out: str | os.PathLike[str],
+    budget: Budget | None = None,
+    bench: Bench | None = None,
+    settings: DiagnosisSettings | None = None,
+    recording: str | os.PathLike[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Campaign:
+    """Diagnose a rig by experiments of its own choice, until it is decided what its model lacks.
+
+    What there is gets diagnosed. While something is open (several answers, one that rests on one
+    recording alone, effects that no recording would have shown), and the budget lasts, the
+    experiment that tells most is proposed, and what every rival predicts is written down; it is
+    played, recorded as it comes, and diagnosed with the rest. Every step is kept in a folder; the
+    same call goes on where it was stopped.
+
+    Parameters
+    ----------
+    device : Device or None
+        Anything with ``read()`` and ``write(command)``, as :func:`pamrs.control.live.run_live`
+        takes it; ``prepare()``, where it has one, is called before each run. None: the commands
+        are written for a person, and the recording is taken back by the next call.
+    rig : Rig
+        The nominal model; what its file allows (``[limits]``) is kept to.
+    case : Case, sequence of Recording or path-like, optional
+        What was recorded before: a case, its folder, or recordings.
+    out : path-like
+        Folder of the campaign; made, or gone on with.
+    budget : Budget, optional
+        Minutes at the bench, runs and litres of air: 30, 6 and 1000 by default.
+    bench : Bench, optional
+        Limits, safe commands and what else is not in the rig file.
+    settings : DiagnosisSettings, optional
+        As for :func:`pamrs.diagnose`.
+    recording : path-like, optional
+        Without a device: the recording of the step that waits for one.
+    progress : callable, optional
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    Campaign
+        The last diagnosis, every step, and why it ended.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not allowed, or the limits allow no experiment.
+    LiveError
+        If the device failed or was lost; the safe command was written, the recording is kept, and
+        the same call goes on.
+    CaseError
+        If the folder holds the campaign of another rig.
+    DiagnosisError
+        If the recordings of this rig cannot be diagnosed, or no experiment is made for it.
+    """
+    work = _Work(device, rig, case, Folder(Path(out), rig), budget, bench, settings, progress)
+    if recording is not None:
+        work.take(Path(recording))
+    return work.run()
+
+
+class _Work:
+    """A campaign at work."""
+
+    def __init__(
+        self,
+        device: Device | None,
+        rig: Rig,
+        case: Any,
+        folder: Folder,
+        budget: Budget | None,
+        bench: Bench | None,
+        settings: DiagnosisSettings | None,
+        progress: Callable[[str], None] | None,
+    ) -> None:
+        self.device, self.rig, self.folder = device, rig, folder
+        self.commands = Commands(rig, bench or Bench())
+        self.budget, self.settings = budget or Budget(), settings or DiagnosisSettings()
+        self.progress, self.say = progress, progress or (lambda line: None)
+        if isinstance(case, (str, os.PathLike)):
+            case = load_case(case)
+        if not isinstance(case, Case):
+            case = Case(rig.name, rig, list(case or ()), folder.path)
+        self.before: list[Recording] = case.recordings
+        if device is not None and not self.commands.ranges:
+            raise ParameterError(
+                f"device = {getattr(device, 'name', device)} is not allowed: rig {rig.name!r} has "
+                "no command that a device could play; None (--step) is needed"
+            )
+        taken = getattr(device, "commands", None)
+        if taken is not None and set(taken) != set(self.commands.ranges):
+            raise ParameterError(
+                f"device = {getattr(device, 'name', device)} takes {', '.join(taken)}, which is "
+                f"not allowed: rig {rig.name!r} has {', '.join(self.commands.ranges)}"
+            )
+        self.found: Diagnosis | None = None
+
+    def run(self) -> Campaign:
+        """On from where it was, to an end."""
+        self.folder.ended = {}
+        while not self.folder.ended:
+            step = self.folder.open
+            if step is None:
+                self.next()
+            elif step.finished or self.recorded(step):
+                self.judge(step)
+        self.folder.save()
+        write_pages(self.folder)
+        ended = self.folder.ended
+        return Campaign(
+            self.folder.path, self.found, self.folder.steps, ended["why"], ended["text"]
+        )
+
+    @property
+    def recordings(self) -> list[Recording]:
+        """All that there are."""
+        return [*self.before, *self.folder.recordings()]
+
+    @property
+    def wanted(self) -> dict[str, list[str]]:
+        """Effects that are to be seen, each with the experiments that show it: every one before an
+        answer has predicted a recording, those not seen yet behind an answer by which nothing is
+        missing, else none.
+        """
+        found, proven = self.found, len(self.recordings) > 1
+        if found is not None and (not found.answer.settled or (proven and not is_healthy(found))):
+            return {}
+        if self.folder.shows is None:
+            self.say("what experiments would show")
+            self.folder.shows = shows_of(plan_of(self.rig, self.before, self.settings))
+            self.folder.save()
+        every = self.folder.shows
+        if found is None or not proven:
+            return every
+        return {effect: every[effect] for effect in unseen(found) if effect in every}
+
+    def diagnose(self) -> None:
+        """What all recordings show."""
+        every = self.recordings
+        if every:
+            case = Case(self.rig.name, self.rig, every, self.folder.path)
+            self.found = diagnose(case, settings=self.settings, progress=self.progress)
+            self.found.to_json(self.folder.path / "result.json")
+
+    def end(self, why: str, text: str) -> None:
+        """Say why it ends."""
+        self.folder.ended = {"why": why, "text": text}
+
+    def next(self) -> None:
+        """Propose the next experiment, or end."""
+        recordings, spent = self.recordings, self.folder.spent
+        if self.found is None:
+            self.diagnose()
+        what = is_open(self.found, len(recordings)) or not_shown(self.wanted)
+        headline = "" if self.found is None else self.found.headline
+        if not what:
+            return self.end("decided", f"Decided: {headline}")
+        over = self.budget.passed(spent + Cost(runs=1))
+        if over:
+            return self.end("budget", f"The budget allows no further run ({over}); open is: {what}")
+        wanted = self.wanted
+        pool = pool_of(
+            self.commands,
+            recordings,
+            self.folder.played,
+            (self.budget, spent),
+            self.settings,
+            hands=self.device is None and not self.commands.bench.unattended,
+        )
+        last = self.folder.steps[-_UNCHANGED:]
+        stuck = len(last) == _UNCHANGED and not any(step.changed for step in last)
+        proposal = None
+        if not (stuck and any(step.repeats for step in last)):
+            proposal = self.proposal(pool, wanted, recordings, repeat=stuck)
+        if proposal is not None:
+            cost = pool.costs[proposal.experiment.name]
+            step = self.folder.propose(proposal, cost, self.commands, told(self.found))
+            write_pages(self.folder)
+            return self.say(f"step {step.number}: {step.name}")
+        helps = f"What would help: {asked_for(self.found, pool)}"
+        if stuck:
+            text = f"The last runs changed nothing; open is: {what}. {helps}"
+            return self.end("unchanged", text)
+        short = [why for why in pool.refused.values() if "budget" in why]
+        if short and not pool.new:
+            return self.end("budget", f"What is left of the budget is too little ({short[0]})")
+        text = f"No allowed experiment parts what is left: {what}. {helps}"
+        return self.end("nothing parts", text)
+
+    def proposal(
+        self,
+        pool: Pool,
+        wanted: Mapping[str, list[str]],
+        recordings: Sequence[Recording],
+        *,
+        repeat: bool,
+    ) -> Proposal | None:
+        """The experiment that tells most; one that was played before where no new one tells."""
+        for again in (True,) if repeat else (False, True):
+            found = proposed(
+                self.rig, self.found, pool, wanted, recordings, self.settings, repeat=again
+            )
+            settled = self.found is not None and self.found.answer.settled
+            if found is not None or settled:
+                return found
+        return None
+
+    def recorded(self, step: Step) -> bool:
+        """Whether the recording of a step is there now: played, or brought by a person."""
+        home = self.folder.home(step)
+        if self.device is None:
+            waiting = home / "recording.csv"
+            if waiting.exists():
+                self.take(waiting)
+                return True
+            self.end("no recording", f"Waits for the recording of {home / 'sheet.md'}")
+            return False
+        protocol = self.folder.protocol(step)
+        if protocol is None:
+            raise CaseError(f"{home}: the commands are missing; give a new folder")
+        path = self.folder.next_file(step)
+        step.recordings.append(str(path.relative_to(self.folder.path)))
+        step.spent.append(step.seconds)  # a run that is killed counts in full
+        self.folder.save()
+        self.say(f"step {step.number}: playing {step.name}, {step.seconds:.0f} s")
+        done = play(self.device, self.commands, protocol, path)
+        step.spent[-1], step.finished = done.seconds, True
+        self.folder.save()
+        return True
+
+    def take(self, path: Path) -> None:
+        """Take the recording of the step that waits for one."""
+        step = self.folder.open
+        if step is None or step.finished:
+            raise CaseError(f"recording = {path} is not allowed: no step waits for one")
+        kept = self.folder.next_file(step, "".join(path.suffixes) or ".csv")
+        shutil.copyfile(path, kept)
+        step.recordings.append(str(kept.relative_to(self.folder.path)))
+        try:
+            self.folder.recording(step)
+        except Exception:
+            kept.unlink()
+            step.recordings.pop()
+            raise
+        step.spent.append(step.seconds)
+        step.finished = True
+        self.folder.save()
+
+    def judge(self, step: Step) -> None:
+        """Score what was foretold of a run, and diagnose with it."""
+        rivals = self.folder.rivals(step)
+        try:
+            step.scores = foretold(rivals, self.folder.recording(step), self.settings)
+        except (DiagnosisError, SimulationError):  # such a run tells nothing of these models alone
+            step.scores = {}
+        self.diagnose()
+        step.after = told(self.found)
+        step.changed = _changed(step.before, step.after)
+        self.folder.save()
+        if self.found is not None:
+            self.found.report(self.folder.home(step) / "report.html")
+            self.found.to_json(self.folder.home(step) / "result.json")
+        write_pages(self.folder)
+
+
+def _changed(before: dict[str, Any] | None, after: dict[str, Any] | None) -> bool:
+    """Whether a run changed what is known: answer, sets, a probability, or what can be seen."""
+    if before is None or after is None:
+        return before != after
+    same = all(before[key] == after[key] for key in ("verdict", "names", "ambiguity", "settled"))
+    moved = abs((before["probability"] or 0.0) - (after["probability"] or 0.0)) >= _MOVED
+    return not same or moved or len(after["unseen"]) < len(before["unseen"])

@@ -1,0 +1,66 @@
+"""What models that were fitted before leave of a new recording: a prediction is scored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from pamrs.diagnosis.fit import FIT_BIN_TIME, bin_width
+from pamrs.diagnosis.next_experiment._choice import Modelled
+from pamrs.diagnosis.next_experiment._differences import (
+    linear,
+    measurable,
+    misfit,
+    problem_of,
+    weights_of,
+)
+from pamrs.diagnosis.noise import bins_of
+from pamrs.diagnosis.prepare import prepare
+from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.recordings import Recording
+
+
+def foretold(
+    hypotheses: Sequence[Modelled], recording: Recording, settings: DiagnosisSettings | None = None
+) -> dict[str, dict[str, float]]:
+    """What each hypothesis leaves of a recording that it was not fitted to, its parameters moved no
+    farther than what was known of them before.
+
+    Parameters
+    ----------
+    hypotheses : sequence of (label, rig, probability)
+        Rigs as fitted, with their effects.
+    recording : Recording
+        Of the same rig; parameters that had another value in it have that.
+    settings : DiagnosisSettings, optional
+        How it is made ready; the published ones by default.
+
+    Returns
+    -------
+    dict of str to dict of str to float
+        By label what is left of each channel: root mean square in bins of 0.1 s, 1 where noise is
+        all [noise levels].
+
+    Raises
+    ------
+    DiagnosisError
+        If the channels of the recording surround no block.
+    SimulationError
+        If a model leaves the range in which it holds.
+    """
+    chosen = DiagnosisSettings() if settings is None else settings
+    found = {}
+    for label, rig, _ in hypotheses:
+        own = tuple(name for name in measurable(rig) if name in recording.channels)
+        prepared = prepare(recording, rig, chosen)
+        problem = problem_of(rig, [prepared], own, chosen)
+        weights = weights_of(problem, rig)
+        left = misfit(problem, linear(problem, rig), weights)
+        # in bins as short as those of the fit a sensor's own noise is larger than in its level
+        white = bins_of(prepared) / bin_width(prepared, FIT_BIN_TIME)
+        channels = {block.name: block.channel for block in problem.blocks}
+        found[label] = {
+            channels[block]: size / math.sqrt(1.0 + (white - 1.0) / weights[block, name] ** 2)
+            for (block, name), size in left.rms.items()
+        }
+    return found

@@ -1,0 +1,336 @@
+"""Campaigns on the independent plant: it answers the commands that `pamrs campaign` asks for, run
+by run, beside random multisines and a fixed protocol.
+
+A case begins with one poor free log of 30 s of a concealed plant. `pamrs campaign --step` sees rig
+file and log alone, and writes the commands of a run; the plant plays them, and the next call takes
+the recording. The same plant is recorded with random multisines as long as those runs, and with a
+fixed protocol; `pamrs diagnose` judges those. After 0 to 3 runs each result is right, wrong or
+open. Keys are drawn, and their digests written, before any of that; everything that is there is
+kept, so that a trial that was stopped goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import multiprocessing
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from .bench import Bench
+from .cases import Concealed, concealed, make
+from .concealed import case_toml, store, stored_key, write
+from .design import SECOND, Spec, specs
+from .drive import FREE, Driver, course
+from .excitation import Excitation, Loop
+from .labs import Lab, table
+from .marks import HEALTHY, family, opened
+from .plan import MANIFEST, SCHEMA
+from .recording import Array, run
+from .rig_kinds import nominal
+from .summary import wilson
+
+RUNS: Final = 3
+ARMS: Final = ("campaign", "multisine", "standard")
+STANDARD: Final = ("sealed_holds", "slow_triangle", "angle_steps")
+STATES: Final = ("right", "wrong", "open")
+_RIGS: Final = ("shoulder", "elbow", "hanging_mass")
+#: what happens once in each recording that was planned, and in no other one
+_EVENTS: Final = ("external_torque", "payload_change")
+_SECONDS: Final = 30.0
+_RATE: Final = 100
+#: Time after which one call of pamrs is given up [s].
+TIMEOUT: Final = 3600.0
+
+
+def specs_of_campaigns(seed: int, cases: int) -> list[Spec]:
+    """The first cases: those of the second plan on rigs with one valve, each with one free log."""
+    found: list[Spec] = []
+    for spec in specs(seed, 6 * cases + 24, _SECONDS, SECOND):
+        events = any(label.split("/")[0] in _EVENTS for label in spec.forms)
+        if spec.rig not in _RIGS or events or len(found) == cases:
+            continue
+        lab = Lab(_RATE, max(spec.lab.bits, 12), one=True)
+        name = f"campaign_{len(found) + 1:04d}"
+        found.append(replace(spec, name=name, lab=lab, recordings=((FREE, "fit"),)))
+    return found
+
+
+class _Case:
+    """One case at work: its plant, its folders."""
+
+    def __init__(self, out: Path, spec: Spec) -> None:
+        self.spec, self.case = spec, out / "cases" / spec.name
+        self.work, self.results = out / "work" / spec.name, out / "results" / spec.name
+        self._drawn: Concealed | None = None
+        self.work.mkdir(parents=True, exist_ok=True)
+        self.results.mkdir(parents=True, exist_ok=True)
+
+    @property
+    def drawn(self) -> Concealed:
+        """What the case conceals; drawn when it is needed."""
+        if self._drawn is None:
+            self._drawn = concealed(self.spec)
+        return self._drawn
+
+    def recorded(self, index: int, shape: Excitation, driver: Any, command: Array | None) -> str:
+        """A run of the plant as a log: of a controller, or of commands."""
+        drawn, bench = self.drawn, self.drawn.bench
+        plant = bench.plant(bench.par, [*drawn.effects, *drawn.errors])
+        own = np.random.default_rng([self.spec.seed, index, 79])
+        sigma = bench.tolerance.get("supply.initial_pressure", 0.0)
+        supply = bench.begins(0) + float(own.uniform(-1.0, 1.0)) * sigma
+        held = 1 if command is not None else self.spec.lab.held
+        record = run(
+            plant, shape, driver, command, supply, bench.noise, own, index, bench.step, held
+        )
+        rest = float(bench.true.get("muscle", {}).get("rest_length", 0.0))
+        return table(record, bench.rig, self.spec.lab, [], rest)[0]
+
+    def played(self, index: int, commands: Path) -> str:
+        """Commands of a file, played on the plant."""
+        rows = np.loadtxt(commands, delimiter=",", skiprows=1, ndmin=2)
+        count = round(float(rows[-1, 0]) / self.drawn.bench.step) + 1
+        times = np.arange(count) * self.drawn.bench.step
+        held = np.searchsorted(rows[:, 0], times + 1e-6, side="right") - 1
+        command = np.array([Loop.quantise(float(v)) for v in rows[held, 1]])
+        zero = np.zeros(count)
+        shape = Excitation(zero, zero.astype(bool), zero, zero.astype(bool))
+        return self.recorded(index, shape, _Nobody(), command)
+
+    def driven(self, index: int, name: str, seconds: float) -> str:
+        """A course of the trial, with its controller."""
+        bench: Bench = self.drawn.bench
+        own = np.random.default_rng([self.spec.seed, index, 81])
+        shape = course(bench.rig, name, seconds, bench.step, own)
+        period = bench.step * self.spec.lab.held
+        driver = Driver(nominal(self.spec.rig)[2], bench.rig, period, own)
+        return self.recorded(index, shape, driver, None)
+
+    def result(self, arm: str, count: int) -> Path:
+        """Where the result of an arm after some runs is kept."""
+        return self.results / f"{arm}_{count}.json"
+
+    def keep(self, arm: str, count: int, found: Path, seconds: float) -> None:
+        """Keep a result, with the time at the bench that it took."""
+        told = json.loads(found.read_text(encoding="utf-8")) if found.is_file() else None
+        write(self.result(arm, count), json.dumps({"seconds": seconds, "result": told}) + "\n")
+
+
+class _Nobody:
+    """Where commands are played nothing is controlled."""
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def __call__(self, *_: Any) -> float:
+        return 0.0
+
+
+def _pamrs(words: Sequence[str | Path], log: Path) -> int:
+    """Run pamrs in a process of its own; what it says goes to a file."""
+    with log.open("a", encoding="utf-8") as stream:
+        call = [sys.executable, "-m", "pamrs", *map(str, words)]
+        try:
+            done = subprocess.run(
+                call, stdout=stream, stderr=stream, timeout=TIMEOUT, check=False, env=_quiet()
+            )
+        except subprocess.TimeoutExpired:
+            stream.write(f"given up after {TIMEOUT:g} s\n")
+            return -1
+    return done.returncode
+
+
+def _quiet() -> dict[str, str]:
+    """The environment with one thread for each process."""
+    return {**os.environ, "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
+
+
+def _campaign(case: _Case) -> list[float]:
+    """The arm that chooses its runs; how long each was [s]."""
+    home, log = case.work / "campaign", case.work / "campaign.log"
+    free = case.case / f"{FREE}.csv"
+    words: list[str | Path] = ["campaign", case.case / "rig.toml", "--log", free, "--out", home]
+    words += ["--step", "--unattended", "--minutes", "60", "--air", "1e6", "--runs", str(RUNS)]
+    state, ended = home / "campaign.json", case.result("campaign", RUNS).is_file()
+    for count in range(RUNS + 1):
+        if not ended and _pamrs(words, log):
+            break
+        told = json.loads(state.read_text(encoding="utf-8")) if state.is_file() else {"steps": []}
+        steps = told["steps"]
+        judged = [step for step in steps if step["changed"] is not None]
+        lengths = [float(step["seconds"]) for step in judged]
+        if not case.result("campaign", count).is_file():
+            # one that ended before says after more runs what it said last
+            own = home / f"step_{count:02d}" if 0 < count <= len(judged) else home
+            case.keep("campaign", count, own / "result.json", sum(lengths[:count]))
+        ended = ended or len(steps) == len(judged)
+        if not ended:
+            folder = home / f"step_{len(steps):02d}"
+            log_of_run = case.played(len(steps), folder / "commands.csv")
+            write(folder / "recording.csv", log_of_run)
+    for count in range(RUNS + 1):  # of a call that failed there is none
+        if not case.result("campaign", count).is_file():
+            case.keep("campaign", count, case.work / "none", 0.0)
+    if not state.is_file():
+        return []
+    steps = json.loads(state.read_text(encoding="utf-8"))["steps"]
+    return [float(step["seconds"]) for step in steps if step["changed"] is not None]
+
+
+def _other(case: _Case, arm: str, lengths: Sequence[float]) -> None:
+    """An arm whose runs do not depend on what was found."""
+    home = case.work / arm
+    names, total = [FREE], 0.0
+    home.mkdir(exist_ok=True)
+    for own in ("rig.toml", f"{FREE}.csv"):
+        write(home / own, (case.case / own).read_text(encoding="utf-8"))
+    for count in range(RUNS + 1):
+        if count:
+            kind = STANDARD[count - 1] if arm == "standard" else "multisine"
+            seconds = lengths[count - 1] if count <= len(lengths) else _SECONDS
+            names.append(f"run_{count}_{kind}")
+            total += seconds
+            file = home / f"{names[-1]}.csv"
+            if not file.is_file():
+                index = 10 * (1 + ARMS.index(arm)) + count
+                write(file, case.driven(index, kind, seconds))
+        if case.result(arm, count).is_file():
+            continue
+        write(home / "case.toml", case_toml([(name, "fit") for name in names]))
+        found = home / f"result_{count}.json"
+        _pamrs(["diagnose", home, "--json", found], case.work / f"{arm}.log")
+        case.keep(arm, count, found, total)
+
+
+def run_case(given: tuple[Path, Spec]) -> str:
+    """All arms of one case, as far as they are not there."""
+    case = _Case(*given)
+    lengths = _campaign(case)
+    for arm in ARMS[1:]:
+        _other(case, arm, lengths)
+    return case.spec.name
+
+
+def trial_of_campaigns(
+    out: Path, seed: int, cases: int, jobs: int, say: Callable[[str], None]
+) -> None:
+    """Write keys, digests and free logs, then run every case; what is there is kept."""
+    manifest = out / MANIFEST
+    wanted = specs_of_campaigns(seed, cases)
+    digests: dict[str, str] = {}
+    if manifest.is_file():
+        digests = json.loads(manifest.read_text(encoding="utf-8"))["keys"]
+    for spec in wanted:
+        told = stored_key(out, spec.name, [FREE], digests)
+        if told is not None and told["spec"] == json.loads(json.dumps(spec.to_dict())):
+            continue
+        made = make(spec)
+        digests[spec.name] = made.digest()
+        text = json.dumps({"schema": SCHEMA, "keys": dict(sorted(digests.items()))}, indent=1)
+        write(manifest, text + "\n")
+        write(out / "keys" / f"{spec.name}.json", made.key)
+        store(made, out / "cases")
+        say(f"{spec.name}: concealed")
+    work = [(out, spec) for spec in wanted]
+    if jobs > 1:
+        with multiprocessing.get_context("spawn").Pool(min(jobs, len(work))) as pool:
+            for name in pool.imap_unordered(run_case, work):
+                say(f"{name}: done")
+    else:
+        for one in work:
+            say(f"{run_case(one)}: done")
+
+
+def is_right(key: dict[str, Any], result: dict[str, Any]) -> bool:
+    """Whether all that a result names is concealed, and something is named where something with a
+    name is; `unlisted` where what is missing has none; nothing where nothing is.
+    """
+    truth = opened(key)
+    said = {family(e["id"]) for e in result["effects"]} if result["verdict"] == "effects" else set()
+    said |= {own["name"] for own in result["wrong_parameters"]}
+    there = truth.names | set(truth.wrong)
+    if there:
+        return bool(said) and said <= there
+    if truth.unlisted or key["verdict"] == "unlisted":
+        return not said and result["verdict"] == "unlisted"
+    return not said and result["verdict"] in HEALTHY
+
+
+def state_of(key: dict[str, Any], result: dict[str, Any] | None) -> str:
+    """A result is open where it says that it is not settled, else right or wrong; wrong without."""
+    if result is None:
+        return "wrong"
+    if not result["answer"]["settled"]:
+        return "open"
+    return "right" if is_right(key, result) else "wrong"
+
+
+def scored(out: Path, names: Sequence[str]) -> dict[str, list[dict[str, float]]]:
+    """By arm and number of runs: how many are right, wrong and open, and the time at the bench."""
+    found: dict[str, list[dict[str, float]]] = {}
+    for arm in ARMS:
+        found[arm] = []
+        for count in range(RUNS + 1):
+            states, seconds, leads = [], [], 0
+            for name in names:
+                key = json.loads((out / "keys" / f"{name}.json").read_text(encoding="utf-8"))
+                file = out / "results" / name / f"{arm}_{count}.json"
+                if file.is_file():
+                    told = json.loads(file.read_text(encoding="utf-8"))
+                    states.append(state_of(key, told["result"]))
+                    leads += told["result"] is not None and is_right(key, told["result"])
+                    seconds.append(float(told["seconds"]))
+            row: dict[str, float] = {state: states.count(state) for state in STATES}
+            row["leads"] = leads
+            row["seconds"] = float(np.mean(seconds)) if seconds else math.nan
+            found[arm].append(row)
+    return found
+
+
+def page(found: dict[str, list[dict[str, float]]], cases: int) -> str:
+    """The scores as a table."""
+    lines = [f"# Campaigns on the independent plant, {cases} cases", ""]
+    lines += [
+        "| arm | runs | right | wrong | open | right, 95 % interval | right, settled or not | "
+        "s at the bench |"
+    ]
+    lines += ["|---|---:|---:|---:|---:|---|---:|---:|"]
+    for arm, rows in found.items():
+        for count, row in enumerate(rows):
+            n = int(sum(row[state] for state in STATES))
+            low, high = wilson(int(row["right"]), n) if n else (0.0, 1.0)
+            cells = " | ".join(f"{row[state]:.0f}" for state in STATES)
+            lines.append(
+                f"| {arm} | {count} | {cells} | {low:.2f} to {high:.2f} | "
+                f"{row['leads']:.0f} | {row['seconds']:.0f} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def draw(found: dict[str, list[dict[str, float]]], file: Path) -> None:
+    """Shares that are right, and wrong, over the runs, as SVG."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+    axes = figure.subplots()
+    for arm, colour in zip(ARMS, ("#0072b2", "#d55e00", "#9ca3af"), strict=True):
+        rows = found[arm]
+        whole = [max(1.0, sum(row[state] for state in STATES)) for row in rows]
+        for state, style in (("right", "-"), ("wrong", ":")):
+            shares = [row[state] / n for row, n in zip(rows, whole, strict=True)]
+            axes.plot(range(len(rows)), shares, "o" + style, color=colour, label=f"{arm}, {state}")
+    axes.set(xlabel="runs after the free log", ylabel="share of cases", ylim=(-0.03, 1.03))
+    axes.set_xticks(range(RUNS + 1))
+    axes.legend(frameon=False, fontsize="small")
+    axes.grid(alpha=0.3)
+    with mpl.rc_context({"svg.hashsalt": "campaign", "svg.fonttype": "none"}):
+        figure.savefig(file, format="svg", metadata={"Date": None})

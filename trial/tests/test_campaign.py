@@ -1,0 +1,98 @@
+"""Campaigns on the independent plant: which cases, what it plays, what is right, wrong or open."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from trial import campaign
+from trial.campaign import ARMS, RUNS, _Case, is_right, page, scored, specs_of_campaigns, state_of
+
+
+def test_a_case_of_a_seed_is_the_same_however_many_are_made():
+    few, many = specs_of_campaigns(7, 2), specs_of_campaigns(7, 5)
+    assert many[:2] == few
+    assert len({spec.name for spec in many}) == 5
+    for spec in many:
+        assert spec.recordings == (("free_log", "fit"),)
+        assert (spec.duration, spec.lab.rate, spec.lab.missing) == (30.0, 100, "")
+
+
+def key(effects=(), wrong=(), verdict="effects", mark="known"):
+    told = [{"id": name, "mark": mark, "block": "chamber"} for name in effects]
+    return {
+        "verdict": verdict,
+        "effects": told,
+        "wrong_parameters": dict.fromkeys(wrong, {"nominal": 1.0, "value": 2.0}),
+        "terms": [],
+        "model_error": {"percent": 0, "sizes": {}},
+        "spec": {"percent": 0, "stated": False},
+    }
+
+
+def result(*effects, verdict="effects", wrong=(), settled=True):
+    return {
+        "verdict": verdict,
+        "effects": [{"id": name} for name in effects],
+        "wrong_parameters": [{"name": name} for name in wrong],
+        "answer": {"settled": settled},
+    }
+
+
+@pytest.mark.parametrize(
+    ("truth", "said", "state"),
+    [
+        (key(["leak_muscle"]), result("leak_muscle"), "right"),
+        (key(["leak_muscle"]), result("leak_muscle", settled=False), "open"),
+        (key(["leak_muscle"]), result("supply_leak"), "wrong"),
+        (key(["leak_muscle", "payload_swing"]), result("leak_muscle"), "right"),
+        (key(["leak_muscle"]), result("leak_muscle", wrong=["arm.payload"]), "wrong"),
+        (key(["leak_muscle"]), result("leak_muscle", verdict="unlisted"), "wrong"),
+        (key(["leak_muscle"]), None, "wrong"),
+        (key(wrong=["arm.payload"]), result(verdict="parameters", wrong=["arm.payload"]), "right"),
+        (key(verdict="none"), result(verdict="none"), "right"),
+        (key(verdict="none"), result("leak_muscle"), "wrong"),
+        (key(verdict="unlisted"), result(verdict="unlisted"), "right"),
+        (key(verdict="unlisted"), result(verdict="parameters"), "wrong"),
+    ],
+)
+def test_a_result_is_right_wrong_or_open(truth, said, state):
+    assert state_of(truth, said) == state
+    assert said is None or state == "open" or is_right(truth, said) == (state == "right")
+
+
+def test_the_plant_plays_commands_as_they_are_written(tmp_path):
+    spec = next(spec for spec in specs_of_campaigns(7, 24) if not spec.forms)
+    case = _Case(tmp_path, spec)
+    times = np.arange(401) * 0.005
+    sent = 5.0 + 0.4 * (times > 0.5) - 0.8 * (times > 1.2)
+    rows = "\n".join(f"{t:.9g},{u:.9g}" for t, u in zip(times, sent, strict=True))
+    (tmp_path / "commands.csv").write_text(f"time [s],valve_command [V]\n{rows}\n")
+    log = case.played(1, tmp_path / "commands.csv").splitlines()
+    assert log[0].startswith("time [s],valve_command [V],supply_pressure [bar],muscle_pressure")
+    table = np.array([[float(cell) for cell in line.split(",")] for line in log[1:]])
+    assert table[:, 0] == pytest.approx(times[::2])  # at the rate of the log
+    assert table[:, 1] == pytest.approx(sent[::2], abs=0.0025)  # of a converter of 12 bits
+    pressure = table[:, 3]
+    assert pressure[table[:, 0] < 0.5] == pytest.approx(0.0, abs=0.05)
+    assert pressure[(table[:, 0] > 1.0) & (table[:, 0] < 1.2)].min() > 0.05
+
+
+def test_what_is_there_is_scored_and_the_page_has_every_arm(tmp_path):
+    for name, states in (("a", "right"), ("b", "open")):
+        (tmp_path / "keys").mkdir(exist_ok=True)
+        (tmp_path / "keys" / f"{name}.json").write_text(json.dumps(key(["leak_muscle"])))
+        (tmp_path / "results" / name).mkdir(parents=True)
+        for arm in ARMS[:2]:
+            for count in range(RUNS + 1):
+                said = result("leak_muscle", settled=states == "right")
+                told = json.dumps({"seconds": 30.0 * count, "result": said})
+                (tmp_path / "results" / name / f"{arm}_{count}.json").write_text(told)
+    found = scored(tmp_path, ["a", "b"])
+    last = found["campaign"][-1]
+    assert (last["right"], last["open"], last["leads"], last["seconds"]) == (1, 1, 2, 90.0)
+    assert math.isnan(found["standard"][0]["seconds"])
+    assert "| campaign | 3 | 1 | 0 | 1 |" in page(found, 2)
+    campaign.draw(found, tmp_path / "curve.svg")
+    assert "campaign, right" in (tmp_path / "curve.svg").read_text()
