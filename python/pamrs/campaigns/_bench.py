@@ -1,5 +1,5 @@
-"""What a bench may be told: the commands of a rig, each with what is safe, its limits, and what
-brings the rig to the state that experiments begin in.
+"""Commands of a rig, each with its safe value and its limits, and those that bring the rig to
+the state that experiments begin in.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SAME: Final = 1e-9  # share of a limit that rounding may pass
 
 @dataclass(frozen=True)
 class Bench:
-    """What may be asked of a device, where that is not what the rig file says.
+    """Limits of a device, where they are not those of the rig file.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Commands:
 
     @property
     def safe(self) -> dict[str, float]:
-        """What is written first and last [SI]."""
+        """Commands that are written first and last [SI]."""
         return {name: safe for name, (safe, _, _) in self.ranges.items()}
 
     @property
@@ -165,7 +165,7 @@ class Commands:
 
 
 def _usual(rig: Rig, name: str) -> tuple[float, float, float, float]:
-    """What is safe for a command, its lowest and highest value, and what it is at rest [SI]."""
+    """Safe value of a command, its lowest and highest one, and that at rest [SI]."""
     kind, block = channel_of(name), name.partition(".")[2]
     if kind == "valve_command":
         table = rig.tables("valve")[block]

@@ -1,4 +1,4 @@
-"""What a campaign may use: minutes, runs and air; and what of it an experiment takes."""
+"""Budget of a campaign (minutes, runs and air), and the share of it that an experiment takes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MINUTE: Final = 60.0  # [s]
 
 @dataclass(frozen=True)
 class Cost:
-    """What runs take.
+    """Time, number and air of runs.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Budget:
-    """What a campaign may use.
+    """Minutes, runs and air that a campaign may use.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Budget:
         positive("air", self.air)
 
     def passed(self, cost: Cost) -> str:
-        """What of it would be passed, in words; empty where nothing is."""
+        """Limits that a cost would pass, in words; empty where it passes none."""
         told = [
             (cost.seconds / _MINUTE, self.minutes, "minutes"),
             (float(cost.runs), float(self.runs), "runs"),
@@ -72,8 +72,8 @@ class Budget:
 
 
 def cost_of(experiment: Experiment, rig: Rig, settle: float) -> Cost:
-    """What an experiment takes, by the model of its rig: its time with what comes before it, and
-    the air that its commands let in.
+    """Cost of an experiment by the model of its rig: its time with what comes before it, and the
+    air that its commands let in.
     """
     litres = 0.0
     try:

@@ -1,5 +1,5 @@
-"""Which experiment comes next: what may be played at all, what was played, and what tells most of
-what is open.
+"""Choice of the next experiment: those that may be played, those that were, and the one that tells
+most of what is open.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _BY_HAND: Final = 1.0  # [s] of effort beyond its length from which an experimen
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
+class ProposedRun:
     """An experiment that is to be played.
 
     Attributes
@@ -56,7 +56,7 @@ class Proposal:
 
 @dataclass(frozen=True, eq=False)
 class Pool:
-    """What may be played.
+    """Experiments that may be played.
 
     Attributes
     ----------
@@ -86,8 +86,8 @@ def pool_of(
     *,
     hands: bool,
 ) -> Pool:
-    """What may be played on a bench after some experiments (name and numbers), within what is left
-    of a budget; with somebody at hand or without.
+    """Experiments that may be played on a bench after some others (name and numbers), within what
+    is left of a budget; with somebody at hand or without.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def pool_of(
 
 
 def alike(experiment: Experiment, name: str, numbers: Mapping[str, Any]) -> bool:
-    """Whether an experiment is one of this kind and level."""
+    """True where an experiment is one of this kind and level."""
     own = experiment.excitation
     if experiment.name != name or own.keys() != numbers.keys():
         return False
@@ -165,12 +165,12 @@ def unseen(diagnosis: Diagnosis) -> list[str]:
 
 
 def is_healthy(diagnosis: Diagnosis) -> bool:
-    """Whether nothing is missing, and no value is wrong, by a diagnosis."""
+    """True where nothing is missing, and no value is wrong, by a diagnosis."""
     return diagnosis.verdict in HEALTHY and not diagnosis.wrong_parameters
 
 
 def is_open(diagnosis: Diagnosis | None, recordings: int) -> str:
-    """What is open by a diagnosis of so many recordings, in words; empty where nothing is."""
+    """Open question of a diagnosis of so many recordings, in words; empty where there is none."""
     if diagnosis is None:
         return "nothing was recorded yet"
     if not diagnosis.answer.settled:
@@ -181,7 +181,7 @@ def is_open(diagnosis: Diagnosis | None, recordings: int) -> str:
 
 
 def not_shown(effects: Iterable[str]) -> str:
-    """What recordings would not show, in words; empty where there is nothing."""
+    """Effects that recordings would not show, in words; empty where there are none."""
     return (
         f"these recordings would not show {_effects(effects)} at the usual size" if effects else ""
     )
@@ -196,7 +196,7 @@ def proposed(
     settings: DiagnosisSettings,
     *,
     repeat: bool,
-) -> Proposal | None:
+) -> ProposedRun | None:
     """The experiment that tells most of what is open; None where no allowed one parts it.
 
     With `repeat` only those that were played before are asked.
@@ -213,20 +213,20 @@ def proposed(
     if not any(label == str(NONE) for label, _, _ in rivals):
         rivals.append((str(NONE), rig, 0.0 if rivals else 1.0))  # what the rig file says
     if own.protocol is not None and own.protocol.name in allowed:
-        return Proposal(allowed[own.protocol.name], own.text, repeat, rivals)
+        return ProposedRun(allowed[own.protocol.name], own.text, repeat, rivals)
     if repeat:
         name = next(iter(allowed), "")
         why = "The same once more: whether it comes out alike says what chance leaves."
-        return Proposal(allowed[name], why, repeat, rivals) if name else None
+        return ProposedRun(allowed[name], why, repeat, rivals) if name else None
     parting = (pair for pair in own.pairs if pair.noises is None or pair.noises >= _LEAST_NOISES)
     told = next((pair for pair in parting if pair.experiment in allowed), None)
     if told is not None:
-        return Proposal(allowed[told.experiment], told.text, repeat, rivals)
+        return ProposedRun(allowed[told.experiment], told.text, repeat, rivals)
     return _showing(diagnosis, allowed, blind, rivals)
 
 
 def _is_nameless(diagnosis: Diagnosis) -> bool:
-    """Whether something is missing that has no name, or that no model with one explains."""
+    """True where something is missing that has no name, or that no model with one explains."""
     return diagnosis.verdict == UNLISTED.rest or diagnosis.answer.why == "missed"
 
 
@@ -236,7 +236,7 @@ def _parting(
     allowed: Mapping[str, Experiment],
     recordings: Sequence[Recording],
     settings: DiagnosisSettings,
-) -> Proposal | None:
+) -> ProposedRun | None:
     """The allowed experiment that parts most of what is left; None where none does."""
     if not allowed:
         return None
@@ -257,11 +257,11 @@ def _parting(
     if found.protocol is None or found.curves is None or bits < _LEAST_BITS:
         return None
     compared = [rival for rival in own.hypotheses if rival[0] in found.curves.predicted]
-    return Proposal(allowed[found.protocol.name], found.text, False, compared, bits)
+    return ProposedRun(allowed[found.protocol.name], found.text, False, compared, bits)
 
 
 def _is_of(own: NextExperiment, allowed: Mapping[str, Experiment]) -> bool:
-    """Whether what a diagnosis proposes is one of the allowed experiments, command by command."""
+    """True where a proposal is one of the allowed experiments, command by command."""
     mine = allowed.get(own.protocol.name) if own.protocol is not None else None
     if mine is None or own.protocol is None or own.curves is None:
         return False
@@ -276,7 +276,7 @@ def _showing(
     allowed: Mapping[str, Experiment],
     blind: Mapping[str, list[str]],
     rivals: list[tuple[str, Any, float]],
-) -> Proposal | None:
+) -> ProposedRun | None:
     """The allowed experiment that shows most of what was not seen yet, at the least effort; else
     the cheapest one, where something is missing that has no name.
     """
@@ -289,10 +289,12 @@ def _showing(
         return None
     shown = _shown_by(best, blind)
     if shown:
-        return Proposal(best, f"It would show {_effects(shown)} at the usual size.", False, rivals)
+        return ProposedRun(
+            best, f"It would show {_effects(shown)} at the usual size.", False, rivals
+        )
     if diagnosis is None or not diagnosis.answer.settled:
         why = "What is missing has no name yet: another motion shows what it depends on."
-        return Proposal(best, why, False, rivals)
+        return ProposedRun(best, why, False, rivals)
     return None
 
 
@@ -302,7 +304,7 @@ def _shown_by(experiment: Experiment, blind: Mapping[str, list[str]]) -> list[st
 
 
 def asked_for(diagnosis: Diagnosis | None, pool: Pool) -> str:
-    """What else would help: a sensor, another payload, hands, in words."""
+    """Other help to ask for: a sensor, another payload, hands, in words."""
     found = []
     if diagnosis is not None:
         ranking = diagnosis.next_experiment.ranking

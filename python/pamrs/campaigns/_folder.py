@@ -15,7 +15,7 @@ from pamrs._arrays import Array
 from pamrs._writing import write_atomically
 from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._budget import Cost
-from pamrs.campaigns._choice import Proposal, unseen
+from pamrs.campaigns._choice import ProposedRun, unseen
 from pamrs.channels import unit_of
 from pamrs.diagnosis import Diagnosis
 from pamrs.diagnosis.next_experiment import measurable
@@ -103,7 +103,7 @@ class Step:
 
     @property
     def cost(self) -> Cost:
-        """What it took so far."""
+        """Cost so far."""
         share = sum(self.spent) / self.seconds if self.seconds > 0.0 else 0.0
         return Cost(sum(self.spent), len(self.spent), self.litres * min(share, len(self.spent)))
 
@@ -181,7 +181,7 @@ class Folder:
 
     @property
     def spent(self) -> Cost:
-        """What all runs took."""
+        """Cost of all runs."""
         return sum((step.cost for step in self.steps), Cost())
 
     @property
@@ -190,7 +190,7 @@ class Folder:
         return [(step.name, step.numbers) for step in self.steps]
 
     def recordings(self) -> list[Recording]:
-        """Those of complete runs, in their order."""
+        """Recordings of complete runs, in their order."""
         return [self.recording(step) for step in self.steps if step.finished and step.recordings]
 
     def recording(self, step: Step) -> Recording:
@@ -206,7 +206,7 @@ class Folder:
         return replace(found, parameters=changed)
 
     def next_file(self, step: Step, ending: str = ".csv") -> Path:
-        """Where the next recording of a step goes."""
+        """Path of the next recording of a step."""
         home, count = self.home(step), 1
         while (path := home / f"recording_{count}{ending}").exists():
             count += 1
@@ -222,7 +222,7 @@ class Folder:
         return Protocol(step.name, time[1], columns, {name: unit_of(name) for name in columns})
 
     def propose(
-        self, proposal: Proposal, cost: Cost, commands: Commands, before: dict[str, Any] | None
+        self, proposal: ProposedRun, cost: Cost, commands: Commands, before: dict[str, Any] | None
     ) -> Step:
         """Write down an experiment with what every rival predicts of it, before it is played."""
         one = proposal.experiment
@@ -250,7 +250,7 @@ class Folder:
         self.save()
         return step
 
-    def _foretell(self, home: Path, proposal: Proposal) -> list[dict[str, Any]]:
+    def _foretell(self, home: Path, proposal: ProposedRun) -> list[dict[str, Any]]:
         """Write the models of all rivals, and what each shows in this experiment."""
         told, heads = list[dict[str, Any]](), ["time [s]"]
         columns: list[Array] = []
@@ -291,7 +291,7 @@ def columns_of(file: Path) -> dict[str, Array]:
 
 
 def told(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
-    """What a diagnosis says, short: as a step keeps it."""
+    """Short form of a diagnosis, as a step keeps it."""
     if diagnosis is None:
         return None
     answer, every = diagnosis.answer, diagnosis.probabilities
@@ -308,8 +308,8 @@ def told(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
     }
 
 
-def sheet(step: Step, proposal: Proposal, commands: Commands) -> str:
-    """What a person at the bench does, as Markdown."""
+def sheet(step: Step, proposal: ProposedRun, commands: Commands) -> str:
+    """Instructions for a person at the bench, as Markdown."""
     one, rig = proposal.experiment, commands.rig
     safe = ", ".join(f"{k} = {v:g} {unit_of(k)}" for k, v in commands.safe.items())
     heard = [name for name in measurable(rig) if name not in one.commands]

@@ -13,7 +13,7 @@ from pamrs.campaigns._bench import Bench, Commands
 from pamrs.campaigns._budget import Budget, Cost
 from pamrs.campaigns._choice import (
     Pool,
-    Proposal,
+    ProposedRun,
     asked_for,
     is_healthy,
     is_open,
@@ -67,7 +67,7 @@ class Campaign:
     text: str
 
     def summary(self) -> str:
-        """What each run changed, and what is open, as text."""
+        """Text of each run's change, and of the open questions."""
         lines = [f"{len(self.steps)} steps in {self.path}"]
         for step in self.steps:
             after = step.after["headline"] if step.after else "waits for its recording"
@@ -217,7 +217,7 @@ class _Work:
         return {effect: every[effect] for effect in unseen(found) if effect in every}
 
     def diagnose(self) -> None:
-        """What all recordings show."""
+        """Diagnose all recordings."""
         every = self.recordings
         if every:
             case = Case(self.rig.name, self.rig, every, self.folder.path)
@@ -276,7 +276,7 @@ class _Work:
         recordings: Sequence[Recording],
         *,
         repeat: bool,
-    ) -> Proposal | None:
+    ) -> ProposedRun | None:
         """The experiment that tells most; one that was played before where no new one tells."""
         for again in (True,) if repeat else (False, True):
             found = proposed(
@@ -288,7 +288,7 @@ class _Work:
         return None
 
     def recorded(self, step: Step) -> bool:
-        """Whether the recording of a step is there now: played, or brought by a person."""
+        """Play a step, or take what a person brought; True where its recording is there then."""
         home = self.folder.home(step)
         if self.device is None:
             waiting = home / "recording.csv"
@@ -346,7 +346,7 @@ class _Work:
 
 
 def _changed(before: dict[str, Any] | None, after: dict[str, Any] | None) -> bool:
-    """Whether a run changed what is known: answer, sets, a probability, or what can be seen."""
+    """True where a run changed answer, sets, a probability, or the sizes that can be seen."""
     if before is None or after is None:
         return before != after
     same = all(before[key] == after[key] for key in ("verdict", "names", "ambiguity", "settled"))

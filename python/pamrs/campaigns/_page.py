@@ -37,7 +37,7 @@ def _page(folder: Folder, title: str, steps: list[dict[str, Any]], ended: str) -
 
 
 def _told(folder: Folder, step: Step) -> dict[str, Any]:
-    """What a page says of a step."""
+    """Text of a step on its page."""
     before, after = step.before or {}, step.after or {}
     chances = [own.get("probabilities", {}) for own in (before, after)]
     names = list(dict.fromkeys([*chances[1], *chances[0]]))
@@ -65,7 +65,7 @@ def _told(folder: Folder, step: Step) -> dict[str, Any]:
 
 
 def _open(after: dict[str, Any]) -> str:
-    """What is still open, in words."""
+    """Open questions, in words."""
     told = [f"{' or '.join(map(set_label, after['ambiguity']))}"] if after.get("ambiguity") else []
     if after and not after["settled"] and not told:
         told.append("the answer is not settled")

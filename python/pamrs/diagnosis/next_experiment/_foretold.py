@@ -1,4 +1,4 @@
-"""What models that were fitted before leave of a new recording: a prediction is scored."""
+"""Scores of predictions: residuals of a new recording under models that were fitted before it."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from pamrs.recordings import Recording
 def foretold(
     hypotheses: Sequence[Modelled], recording: Recording, settings: DiagnosisSettings | None = None
 ) -> dict[str, dict[str, float]]:
-    """What each hypothesis leaves of a recording that it was not fitted to, its parameters moved no
-    farther than what was known of them before.
+    """Residuals of each hypothesis in a recording that it was not fitted to, its parameters moved
+    no farther than what was known of them before.
 
     Parameters
     ----------
