@@ -20,16 +20,16 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1108,
-    "cli": 1363,
+    "cli": 1367,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11019,
+    "diagnosis": 11044,
     "effects": 404,
     "experiments": 1052,
     "findings": 945,
     "fit": 2937,
     "library": 71,
-    "recordings": 4864,
+    "recordings": 5143,
     "report": 2059,
     "rig": 2222,
     "rigs": 139,
@@ -39,7 +39,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 26685,
+    "tests": 26844,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -47,7 +47,7 @@ ASIDE = {
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 35864
+MOST = 36172
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -27,6 +27,7 @@ _TOP: Final = 0.995  # quantile that stands for the largest value, spikes left o
 _LOW: Final = 0.005
 _HIGHEST: Final = 25e5  # no pneumatic muscle or its supply goes higher, without a rig to ask [Pa]
 _RATED: Final = (0.6, 1.5)  # a tank beside what the rig file says of it
+_LEAST: Final = 0.02  # of the supply, which a muscle is filled to at the least
 _OVER: Final = 1.15  # a muscle beside what feeds it
 _CONNECTED: Final = 0.2  # of what the rig file says, from which a supply's gauge is believed
 _REST: Final = 0.02  # share of the samples that rest at the lowest level
@@ -34,6 +35,8 @@ _STAYS: Final = 0.8  # of the samples near it that are there: a curve that passe
 _NEAR: Final = 0.06  # of the ambient pressure, beside which a level counts as ambient
 _AMBIENT_OFF: Final = 0.02  # of the stated ambient pressure; a gauge and weather do less
 _VOLTS: Final = 30.0  # no valve is commanded with more
+_TURN: Final = 2.0 * np.pi  # [rad] no joint goes farther
+_LONGEST: Final = 3.0  # [m] no muscle or stroke is longer
 _NEWTONS: Final = 5e4  # no muscle pulls more
 _SLACK: Final = 0.25  # of an allowed range, which may be left at its ends
 
@@ -188,8 +191,9 @@ def _fed_by(
     if channel_of(name) == "supply_pressure":
         return rated
     recorded = _recorded_supply(channels, said, rig)
-    # a gauge that is not connected tells nothing of what it should measure
-    connected = recorded > 0.0 and (rated is None or recorded > _CONNECTED * rated[0])
+    # a gauge that is not connected, or that is the muscle's, tells nothing of its supply
+    lowest = max(0.0, _level(channels[name], _LOW))
+    connected = recorded > lowest and (rated is None or recorded > _CONNECTED * rated[0])
     return (recorded, "the recorded supply") if connected else rated
 
 
@@ -243,7 +247,7 @@ def _pressure(
     most = (_RATED[1] if supply else _OVER) if beside else 1.0
     wrong = top > 0.0 and not least <= top / reference <= most
     if wrong and not _agrees(name, top, unit, channels, said):
-        likely = _fitting(top, unit, reference, least if least else 0.02, most)
+        likely = _fitting(top, unit, reference, least or _LEAST, most)
         if likely:
             turned = float(_other(top, unit, likely))
             now, other = (_in_both(unit, "Pa", rig, value) for value in (top, reference))
@@ -403,19 +407,20 @@ def assumed_unit(name: str, values: Array, rig: Rig | None, stated: str) -> tupl
     numbers = f"its numbers are {low:.4g} to {high:.4g}"
     if CHANNELS[channel].unit == "Pa":
         return _pressure_unit(channel, _top_of(values), rig, stated, numbers)
-    limits = limits_of(rig, name)
+    # of an angle or a length the rig file says the range, else what a stand can have
     choices = {"joint_angle": ("rad", "deg"), "length": ("m", "mm")}.get(channel)
-    if choices and limits:
-        slack = 0.25 * (limits[1] - limits[0])
+    most = max(abs(low), abs(high))
+    if choices:
+        limits = limits_of(rig, name)
+        ends = limits or ((-_TURN, _TURN) if channel == "joint_angle" else (-_LONGEST, _LONGEST))
+        slack = _SLACK * (ends[1] - ends[0]) if limits else 0.0
         for unit in choices:
             scale = parse_unit(unit).scale
-            if limits[0] - slack <= low * scale and high * scale <= limits[1] + slack:
-                return unit, f"{numbers}, which in {unit} lies where the rig file allows it"
-    most = max(abs(low), abs(high))
-    if channel == "joint_angle":
-        return ("rad" if most <= 6.3 else "deg"), numbers
-    if channel == "length":
-        return ("m" if most <= 3.0 else "mm"), numbers
+            if ends[0] - slack <= low * scale and high * scale <= ends[1] + slack:
+                fits = f", which in {unit} lies where the rig file allows it" if limits else ""
+                return unit, numbers + fits
+        whose = "the rig file allows it" if limits else "it can be"
+        return "", f"{numbers}, which neither in {' nor in '.join(choices)} lies where {whose}"
     if channel in ("temperature", "ambient_temperature"):
         return ("K" if low > 200.0 else "degC"), numbers
     usual = CHANNELS[channel].unit.replace("N m", "Nm")
@@ -430,7 +435,7 @@ def _pressure_unit(
     """Unit of pressure with which the maximum fits the supply, and words on the choice."""
     supplies = rig.tables("supply").values() if rig else ()
     reference = max([0.0, *(float(table["initial_pressure"]) for table in supplies)]) or 8e5
-    least, most = (0.6, 1.5) if channel == "supply_pressure" else (0.03, 1.1)
+    least, most = _RATED if channel == "supply_pressure" else (_LEAST, 1.1)
     if channel == "ambient_pressure":
         reference, least, most = AMBIENT, 0.5, 1.15
 
@@ -444,8 +449,9 @@ def _pressure_unit(
     fitting = [unit for unit in _UNITS if fits(unit)]
     if not fitting:
         return "", f"{numbers}, which is no likely pressure here in any of {', '.join(_UNITS)}"
-    others = f"; {' or '.join(fitting[1:])} would fit, too" if fitting[1:] else ""
-    return fitting[0], numbers + others
+    if len(fitting) > 1:
+        return "", f"{numbers}, which may be {' or '.join(fitting)}"
+    return fitting[0], numbers
 
 
 def subtracted(recorded: Array | None, stated: float | None, unit: str) -> tuple[float, str]:

@@ -16,7 +16,7 @@ from pamrs._files import MOST_SIZE
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import check_size
 from pamrs.recordings._stamps import TIME_UNITS
-from pamrs.recordings.table import Table
+from pamrs.recordings.table import Table, told_few
 from pamrs.units import parse_unit
 
 #: What a heading has behind its name: a unit in brackets (a number there tells two columns of one
@@ -177,9 +177,7 @@ def table_of(log: Log) -> Table:
 
 
 def _few(names: Any, most: int = 12) -> str:
-    known = [repr(name) for name in names]
-    more = f" and {len(known) - most} more" if len(known) > most else ""
-    return ", ".join(known[:most]) + more
+    return told_few(map(repr, names), most)
 
 
 def collected(
