@@ -4,7 +4,8 @@ from their measured neighbours.
 Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `averaged_to_need`
 (long recordings), `overlap`, `without_copies`, `Overlap`
 (recordings that hold the same samples),
-`check_plausible`, `check_sense`, `implausible`, `without_dead_commands`, `without_impossible`,
+`check_plausible`, `check_sense`, `turned_about`, `implausible`, `without_dead_commands`,
+`without_impossible`,
 `without_rails`,
 `suspected_units` (what recordings cannot be), `uncommanded`, `unusable` (which cannot be used),
 `prepare`, `Prepared`, `binned`, `noise_level`,
@@ -38,6 +39,7 @@ from pamrs.diagnosis.prepare._plausible import (
     check_plausible,
     check_sense,
     implausible,
+    turned_about,
     without_dead_commands,
     without_impossible,
 )
@@ -98,6 +100,7 @@ __all__ = [
     "smoothed",
     "suspected_units",
     "thermometers_of",
+    "turned_about",
     "unjudged_blocks",
     "uncommanded",
     "unread_tanks",
