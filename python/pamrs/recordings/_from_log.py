@@ -21,7 +21,7 @@ from pamrs.recordings._recording import Issue, Recording
 from pamrs.recordings._several_clocks import Sampled, recording_of, sampled
 from pamrs.recordings._splitting import Cut, Split, parts, read_split
 from pamrs.recordings._stamps import Ticks, counted_on, ticks, unit_of_stamps
-from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
+from pamrs.recordings.logs import Log, Series, TextFormat, read_log, switched, understood_unit
 from pamrs.recordings.table import stem_of
 from pamrs.units import same_dimension, to_si
 
@@ -248,7 +248,7 @@ def _with_remarks(
 
 def _sampled(log: Log, item: Source, clocks: Clocks, clock: Clock) -> Sampled:
     """Values and times of one channel in SI; rows without a time are left out."""
-    series = log.find(item.column)
+    series = switched(log.find(item.column))
     if series.labels:
         raise RecordingError(
             f"{log.path}: {item.column!r} holds texts like {series.labels[0]!r}, no numbers for "

@@ -20,7 +20,7 @@ from pamrs.channels import (
     with_trait,
 )
 from pamrs.recordings._doubts import PRESSURES, ambient_of, assumed_unit, subtracted
-from pamrs.recordings.logs import SWITCHES, Series, Written, understood_unit
+from pamrs.recordings.logs import Series, Written, switched, understood_unit
 from pamrs.rig import Rig
 from pamrs.units import parse_unit, same_dimension
 
@@ -203,6 +203,7 @@ def matched(
     remarks : list of str
         Units that were assumed, absolute pressures, and commands that this rig has not.
     """
+    candidates = [switched(each) for each in candidates]
     pairs: list[tuple[float, bool, int, int]] = []
     kinds = [channel_of(name) for name in wanted]
     for row, series in enumerate(candidates):
@@ -289,10 +290,11 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
 
 def switch_levels(series: Series) -> str:
     """Words for the two values of a switch; empty for a series that is none."""
-    if series.unit.partition("/")[::2] in SWITCHES:
-        return "0 for {} and 1 for {}".format(*series.unit.split("/"))
     good = series.values[np.isfinite(series.values)]
-    return "" if series.unit or not np.isin(good, (0.0, 1.0)).all() else "0 or 1"
+    if understood_unit(series.unit) or not np.isin(good, (0.0, 1.0)).all():
+        return ""
+    off, _, on = series.unit.partition("/")
+    return f"0 for {off} and 1 for {on}" if on else "0 or 1"
 
 
 _AIR: Final = frozenset(("atm",))

@@ -22,7 +22,7 @@ from pamrs.recordings.dialect import (
     is_useful,
 )
 from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, series_of_texts
-from pamrs.recordings.logs._words import SWITCHES, split_heading, understood_unit, unwrapped
+from pamrs.recordings.logs._words import split_heading, understood_unit, unwrapped
 from pamrs.recordings.table import (
     NO_VALUE,
     Lines,
@@ -94,10 +94,11 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
     """
     text, source = read_text(path), str(path)
     remarks: list[str] = []
-    if _FORTRAN.search(text):
-        text = _FORTRAN.sub("E", text)
-        remarks.append("exponents are written with D, as Fortran does: read")
     lines = [line for line in text.splitlines() if line.strip()]
+    if any(map(_FORTRAN.search, lines[len(lines) // 2 :][:_LINES])):
+        text = _FORTRAN.sub("E", text)
+        lines = [line for line in text.splitlines() if line.strip()]
+        remarks.append("exponents are written with D, as Fortran does: read")
     times: list[str] | None = None
     if form.delimiter is None:
         apart = times_apart(lines, source)
@@ -161,10 +162,13 @@ def log_of_lines(
         raise RecordingError(
             f"{path}: no table was found: it has {len(rows.lines)} rows of numbers"
         )
-    dated = [k for k, line in enumerate(rows.lines) if ":" in line]
-    dated = [k for k in dated if _is_dated(rows.parted(rows.lines[k]), above.kinds)]
-    left = told_rows([rows.numbers[k] for k in dated], "rows with a time of day for a number")
-    rows = rows.only([k for k in range(len(rows.lines)) if k not in set(dated)]) if dated else rows
+    stamped = "moment" in above.kinds  # then each row has a time of day, and is not asked
+    parted = ((k, rows.parted(line)) for k, line in enumerate(rows.lines) if ":" in line)
+    odd = (
+        {} if stamped else {k: rows.numbers[k] for k, row in parted if _is_dated(row, above.kinds)}
+    )
+    left = told_rows([*odd.values()], "rows with a time of day for a number")
+    rows = rows.only([k for k in range(len(rows.lines)) if k not in odd])
     width = len(above.kinds)
     rows, part, said = same_width(rows, width, above.rows, str(path), strict=False)
     said = [*remarks, *above.remarks, *left, *said]
@@ -245,7 +249,8 @@ def _first_row(
 def _is_dated(row: list[str], kinds: list[str]) -> bool:
     """True where a time of day stands in a column of numbers: the row is none of the table."""
     pairs = zip(row, kinds, strict=False)
-    return any(kind == "number" and is_moment(cell.strip()) for cell, kind in pairs)
+    times = [cell for cell, kind in pairs if kind == "number" and ":" in cell]
+    return any(is_moment(cell.strip()) for cell in times)
 
 
 def _begun_before(rows: list[list[str]], width: int, useful: Callable[[list[str]], int]) -> int:
@@ -376,7 +381,8 @@ def _dated(
     rows: Lines, names: list[str], units: list[str], remarks: list[str]
 ) -> tuple[Lines, list[str], list[str]]:
     """Rows, names and units with a date and the time of day beside it in one cell."""
-    some = rows.rows(len(rows.lines) // 2)[:1]
+    middle = len(rows.lines) // 2
+    some = rows.rows(middle, middle + 1)
     dates = [k for row in some for k, cell in enumerate(row) if is_date(cell)]
     times = [k for row in some for k, cell in enumerate(row) if is_moment(cell)]
     if not dates or not times or is_date(some[0][times[0]].split()[0]):
@@ -458,8 +464,8 @@ def _of_texts(
     thousands: str | None,
     remarks: list[str],
 ) -> tuple[Series, list[str]]:
-    """A column of dates, of numbers with their units, of words of a switch or of other texts, and
-    the cells that are none; an error if there are too many, or too many units.
+    """A column of dates, of numbers with their units or of texts, and the cells that are none; an
+    error if there are too many, or too many units.
     """
     stamps = moments(cells)
     if stamps is not None:
@@ -477,12 +483,6 @@ def _of_texts(
         odd = [cell for cell, match in zip(cells, matches, strict=True) if not match]
         lost = [cell for cell in odd if cell.lower() not in NO_VALUE]
         return Series(name, values, unit or units.popitem()[0]), lost
-    words = {cell.lower() for cell in cells} - NO_VALUE
-    for pair in SWITCHES:
-        if words and words <= set(pair):
-            remarks.append(f"{name}: {pair[0]} is read as 0, {pair[1]} as 1")
-            levels = [pair.index(word) if (word := c.lower()) in pair else np.nan for c in cells]
-            return Series(name, np.array(levels, dtype=np.float64), "/".join(pair)), []
     if (count := len(set(cells))) > _MOST_TEXTS:
         raise RecordingError(f"it has {count} different texts")
     return series_of_texts(name, cells), []

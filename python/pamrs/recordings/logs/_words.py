@@ -81,13 +81,6 @@ _PRESSURES: Final = (
 )
 
 
-#: Pairs of words that a switch or a valve has, the first of them at rest.
-SWITCHES: Final = (
-    *(("off", "on"), ("false", "true"), ("closed", "open"), ("low", "high"), ("no", "yes")),
-    *(("aus", "ein"), ("aus", "an"), ("zu", "auf"), ("nein", "ja"), ("geschlossen", "offen")),
-)
-
-
 class Written(NamedTuple):
     """Unit of a log in the terms of the package, with a calibration where the text gives one.
 
