@@ -29,7 +29,7 @@ PACKAGES = {
     "findings": 945,
     "fit": 2937,
     "library": 71,
-    "recordings": 5143,
+    "recordings": 5161,
     "report": 2059,
     "rig": 2222,
     "rigs": 139,
@@ -47,7 +47,7 @@ ASIDE = {
     "trial/tests": 1144,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 36172
+MOST = 36190
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -194,7 +194,7 @@ DIALECTS = {
     ),
     "counts of an encoder": Dialect(
         written(PLAIN, HEAD.replace(" [deg]", ""), data=DATA * [1, 1, 1, 70]),
-        ("angle is called like joint_angle, and has no unit", "neither in rad nor in deg lies"),
+        ("angle is called like joint_angle, and has no unit", "does not lie in one of rad, deg"),
         ALL - {"joint_angle"},
     ),
     "water columns without a unit": Dialect(
@@ -267,7 +267,7 @@ BROKEN = [
     ("log.jsonl", '{"t": 0}\n{"t": 1,}\n', r"log.jsonl: line 2, column \d+: "),
     ("log.json", '{"rate": 50}', "no table was found: neither a list of records nor columns"),
     ("log.txt", "a x=1 1669112211000\na x=1 1669112212000\nb x=2 1669112213000\n", "line 3 is of"),
-    ("log.csv", "t [s],p\n0,1 bar\n1,2 bar\n2,300 mbar\n", "several units: 2 bar, 300 mbar"),
+    ("log.csv", "t [s],p\n0,1 bar\n1,2 bar\n2,300 mbar\n", "'2 bar' in row 3, '300 mbar' in row 4"),
 ]  # fmt: skip
 
 

@@ -35,8 +35,9 @@ _STAYS: Final = 0.8  # of the samples near it that are there: a curve that passe
 _NEAR: Final = 0.06  # of the ambient pressure, beside which a level counts as ambient
 _AMBIENT_OFF: Final = 0.02  # of the stated ambient pressure; a gauge and weather do less
 _VOLTS: Final = 30.0  # no valve is commanded with more
-_TURN: Final = 2.0 * np.pi  # [rad] no joint goes farther
-_LONGEST: Final = 3.0  # [m] no muscle or stroke is longer
+_TURNS: Final = (-2.0 * np.pi, 2.0 * np.pi)  # [rad] no joint goes farther
+_LENGTHS: Final = (1e-3, 3.0)  # [m] no muscle is shorter or longer
+_STILL: Final = 0.02  # of the range that is allowed; a recording has more
 _NEWTONS: Final = 5e4  # no muscle pulls more
 _SLACK: Final = 0.25  # of an allowed range, which may be left at its ends
 
@@ -344,25 +345,32 @@ def _temperature(name: str, unit: str, values: Array, rig: Rig | None) -> Iterat
             return
 
 
+def _room(name: str, rig: Rig | None) -> tuple[float, float, float]:
+    """Limits of an angle or a length by the rig file, and what it may go beyond them; without a
+    rig file those of every stand, and nothing [SI].
+    """
+    given = limits_of(rig, name)
+    low, high = given or (_TURNS if channel_of(name) == "joint_angle" else _LENGTHS)
+    return low, high, _SLACK * (high - low) if given else 0.0
+
+
 def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Suspicion]:
     """Doubt the unit of an angle or a length outside the rig's limits, else the usual range."""
     angle = channel_of(name) == "joint_angle"
-    given = limits_of(rig, name)
-    low, high = given or ((-2.0 * np.pi, 2.0 * np.pi) if angle else (1e-3, 10.0))
-    slack = _SLACK * (high - low) if given else 0.0
+    low, high, slack = _room(name, rig)
     bottom, top = _level(values, _LOW), _top_of(values)
 
     def fits(first: float, last: float) -> bool:
         return low - slack <= first and last <= high + slack
 
-    if fits(bottom, top) and not (given and top - bottom < 0.02 * (high - low)):
+    if fits(bottom, top) and not (slack and top - bottom < _STILL * (high - low)):
         return
     for other in ("deg", "rad", "mrad", "rev") if angle else ("m", "mm", "cm", "in", "um"):
         if _as_large(other, unit):
             continue
         first, last = (float(_other(edge, unit, other)) for edge in (bottom, top))
         if fits(first, last) and last - first > 5.0 * (top - bottom) * fits(bottom, top):
-            ends = "the rig file allows" if given else "possible are"
+            ends = "the rig file allows" if slack else "possible are"
             si = "rad" if angle else "m"
             own = unit if rig is None else rig.units.usual(si)
             now, then, wide = (
@@ -407,23 +415,20 @@ def assumed_unit(name: str, values: Array, rig: Rig | None, stated: str) -> tupl
     numbers = f"its numbers are {low:.4g} to {high:.4g}"
     if CHANNELS[channel].unit == "Pa":
         return _pressure_unit(channel, _top_of(values), rig, stated, numbers)
-    # of an angle or a length the rig file says the range, else what a stand can have
-    choices = {"joint_angle": ("rad", "deg"), "length": ("m", "mm")}.get(channel)
-    most = max(abs(low), abs(high))
-    if choices:
-        limits = limits_of(rig, name)
-        ends = limits or ((-_TURN, _TURN) if channel == "joint_angle" else (-_LONGEST, _LONGEST))
-        slack = _SLACK * (ends[1] - ends[0]) if limits else 0.0
-        for unit in choices:
-            scale = parse_unit(unit).scale
-            if ends[0] - slack <= low * scale and high * scale <= ends[1] + slack:
-                fits = f", which in {unit} lies where the rig file allows it" if limits else ""
-                return unit, numbers + fits
-        whose = "the rig file allows it" if limits else "it can be"
-        return "", f"{numbers}, which neither in {' nor in '.join(choices)} lies where {whose}"
+    units = {"joint_angle": ("rad", "deg"), "length": ("m", "mm")}.get(channel)
+    if units:
+        first, last, slack = _room(name, rig)
+        ends = {u: (low * parse_unit(u).scale, high * parse_unit(u).scale) for u in units}
+        fit = [u for u, (a, b) in ends.items() if first - slack <= a and b <= last + slack]
+        if len(fit) > 1:  # a stand hardly stays within so little of what it can do
+            fit = [u for u in fit if ends[u][1] - ends[u][0] >= _STILL * (last - first)]
+        where = "the rig file allows it" if slack else "it can be"
+        if len(fit) != 1:
+            return "", f"{numbers}, which does not lie in one of {', '.join(units)} where {where}"
+        return fit[0], f"{numbers}, which in {fit[0]} lies where {where}"
     if channel in ("temperature", "ambient_temperature"):
         return ("K" if low > 200.0 else "degC"), numbers
-    usual = CHANNELS[channel].unit.replace("N m", "Nm")
+    most, usual = max(abs(low), abs(high)), CHANNELS[channel].unit.replace("N m", "Nm")
     if most > (_VOLTS if usual == "V" else _NEWTONS):
         return "", f"{numbers}, too large for {usual}"
     return usual, f"{numbers}, and {usual} is what it is usually logged in"

@@ -261,6 +261,13 @@ def _sampled(log: Log, item: Source, clocks: Clocks, clock: Clock) -> Sampled:
     return replace(made, remarks=(said, *made.remarks)) if said else made
 
 
+def unit_of_clock(series: Series) -> tuple[str, str]:
+    """Unit of the times in a series: what the log says, else by name and size; and a remark."""
+    known = understood_unit(series.unit)
+    said = known.unit if known is not None and same_dimension(known.unit, "s") else ""
+    return unit_of_stamps(series.values, series.name, said)
+
+
 class Clocks:
     """The clocks of a log, each put in order once."""
 

@@ -18,7 +18,7 @@ from pamrs.channels import CHANNELS, channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import usual_interval
 from pamrs.recordings._doubts import suspicions
-from pamrs.recordings._from_log import Clocks, load_recordings
+from pamrs.recordings._from_log import Clocks, load_recordings, unit_of_clock
 from pamrs.recordings._mapping import Clock
 from pamrs.recordings._matching import (
     NOT_A_CHANNEL,
@@ -31,7 +31,7 @@ from pamrs.recordings._matching import (
 from pamrs.recordings._recording import Recording
 from pamrs.recordings._several_clocks import SLOW, UNTOLD, Sampled, sampled
 from pamrs.recordings._splitting import Cut, Split, stretches_of
-from pamrs.recordings._stamps import CLOCK_WORDS, Ticks, filled_rows, ticks, unit_of_stamps
+from pamrs.recordings._stamps import CLOCK_WORDS, Ticks, filled_rows, ticks
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
 from pamrs.recordings.table import stem_of, told_few
 from pamrs.rig import Rig
@@ -472,9 +472,7 @@ class _Clocks:
             return fine, near, "header" in words_of(other.name), -len(other.name)
 
         best = max(fitting, key=rank)
-        known = understood_unit(best.unit)
-        said = known.unit if known is not None and same_dimension(known.unit, "s") else ""
-        unit, remark = unit_of_stamps(best.values, best.name, said)
+        unit, remark = unit_of_clock(best)
         if remark and remark not in self.remarks:
             self.remarks.append(remark)
         return {"column": best.name, "unit": unit}
@@ -495,11 +493,11 @@ class _Clocks:
 
     def _compare(self, used: Series) -> None:
         """Say by how much another clock of the same rows lags behind the one that is used."""
-        mine = used.values * parse_unit(unit_of_stamps(used.values, used.name)[0]).scale
+        mine = used.values * parse_unit(unit_of_clock(used)[0]).scale
         for other in self._rising:
             if other is used or len(other.values) != len(mine):
                 continue
-            scale = parse_unit(unit_of_stamps(other.values, other.name)[0]).scale
+            scale = parse_unit(unit_of_clock(other)[0]).scale
             away = other.values * scale - mine
             away = away[np.isfinite(away)]
             if len(away) and float(np.max(np.abs(away))) < 60.0:

@@ -40,7 +40,6 @@ __all__ = [
     "split_rows",
     "stem_of",
     "thousands_of",
-    "told_cells",
     "told_few",
     "told_rows",
     "usual_width",
@@ -179,6 +178,17 @@ class Table:
         matrix = self._matrices.get(decimal)
         return matrix is not None and index in matrix.whole
 
+    def told(self, index: int, rows: Sequence[int]) -> list[str]:
+        """Remark on cells of a column that are no numbers, in a list; empty where there are none:
+        ``3 cells are no numbers ('OL', '#N/A'): taken as missing, the first in row 7``.
+        """
+        if not rows:
+            return []
+        some = told_few(dict.fromkeys(repr(self.cell(index, row)[:20]) for row in rows))
+        count = "1 cell is no number" if len(rows) == 1 else f"{len(rows)} cells are no numbers"
+        first = f"{'the first ' * (len(rows) > 1)}in row {self.row_numbers[rows[0]]}"
+        return [f"{count} ({some}): taken as missing, {first}"]
+
     def samples(
         self, index: int, label: str, source: str, thousands: str | None, decimal: str
     ) -> tuple[Array, str]:
@@ -210,7 +220,7 @@ class Table:
         hint = _number_hint(cells[0], thousands, decimal)
         if len(strange) > len(values) // (20 if hint else 5):
             self.numbers(index, label, source, thousands, decimal)  # says which
-        return values, told_cells(cells)
+        return values, self.told(index, strange)[0]
 
     def numbers(
         self, index: int, label: str, source: str, thousands: str | None, decimal: str
@@ -305,13 +315,6 @@ def numbers_of_cells(
                     strange.append(row)
     values[~(np.abs(values) < MOST_SIZE)] = math.nan
     return values, strange
-
-
-def told_cells(cells: Sequence[str]) -> str:
-    """Remark on cells that are no numbers: ``3 cells are no numbers ('OL', '#N/A')``."""
-    some = told_few(dict.fromkeys(repr(cell.strip()[:20]) for cell in cells))
-    count = "1 cell is no number" if len(cells) == 1 else f"{len(cells)} cells are no numbers"
-    return f"{count} ({some}): taken as missing"
 
 
 def told_few(texts: Iterable[str], most: int = 4) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -196,8 +196,8 @@ def table_of(log: Log) -> Table:
     return Table(header, cells, [*log.remarks, *left])
 
 
-def _few(names: Any, most: int = 12) -> str:
-    return told_few(map(repr, names), most)
+def _few(names: Iterable[str]) -> str:
+    return told_few(map(repr, names), most=12)
 
 
 def collected(

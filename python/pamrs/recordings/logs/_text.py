@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -34,7 +35,6 @@ from pamrs.recordings.table import (
     read_text,
     same_width,
     split_rows,
-    told_cells,
     told_few,
     told_rows,
     usual_width,
@@ -430,7 +430,7 @@ def _column(
     if 2 * len(strange) < np.isfinite(values).sum() and not table.doubtful(place, decimal):
         odd = [table.cell(place, row) for row in strange]
         if not any("," in cell or "." in cell for cell in odd):
-            remarks += [f"{name}: {told_cells(odd)}"] if odd else []
+            remarks += [f"{name}: {text}" for text in table.told(place, strange)]
             found.append(Series(name, values, unit))
             return
     cells = [str(cell) for cell in table.cells(place)]
@@ -443,49 +443,44 @@ def _column(
         values, strange = table.read(place, mark, decimal)
     filled = sum(map(bool, cells))
     if 2 * len(strange) < filled:
-        if strange:
-            remarks.append(f"{name}: {told_cells([cells[row] for row in strange])}")
+        remarks += [f"{name}: {text}" for text in table.told(place, strange)]
         found.append(Series(name, values, unit))
         return
     try:
-        made, lost = _of_texts(name, cells, unit, decimal, thousands, remarks)
+        made, lost, said = _of_texts(Series(name, values, unit), cells, table, decimal, thousands)
     except RecordingError as error:
         unread[name] = str(error)
         return
     found.append(made)
-    remarks += [f"{name}: {told_cells(lost)}"] if lost else []
+    remarks += [f"{name}: {text}" for text in (*table.told(place, lost), *said)]
 
 
 def _of_texts(
-    name: str,
-    cells: list[str],
-    unit: str,
-    decimal: str,
-    thousands: str | None,
-    remarks: list[str],
-) -> tuple[Series, list[str]]:
-    """A column of dates, of numbers with their units or of texts, and the cells that are none; an
-    error if there are too many, or too many units.
+    series: Series, cells: list[str], table: Table, decimal: str, thousands: str | None
+) -> tuple[Series, list[int], list[str]]:
+    """A column of dates, of numbers with their units or of texts, rows of cells that are none, and
+    remarks; an error if there are too many texts or units.
     """
     stamps = moments(cells)
     if stamps is not None:
-        remarks += [f"{name}: {stamps[1]}"] if stamps[1] else []
-        lost = [cell for cell, value in zip(cells, stamps[0], strict=True) if np.isnan(value)]
-        return Series(name, stamps[0], "s", stamps=True), lost
+        lost = np.flatnonzero(np.isnan(stamps[0])).tolist()
+        made = Series(series.name, stamps[0], "s", stamps=True)
+        return made, lost, [stamps[1]] if stamps[1] else []
     matches = [QUANTITY.fullmatch(cell) for cell in cells]
-    units = {match["unit"]: match[0] for match in matches if match and match["unit"]}
+    units = {match["unit"]: row for row, match in enumerate(matches) if match and match["unit"]}
     if units and 2 * sum(match is not None for match in matches) > sum(map(bool, cells)):
         if len(units) > 1:
-            raise RecordingError(f"its cells have several units: {told_few(units.values())}")
+            some = (f"{cells[row]!r} in row {table.row_numbers[row]}" for row in units.values())
+            raise RecordingError(f"its cells have several units: {told_few(some)}")
         values, _ = numbers_of_cells(
             [m["number"] if m else "" for m in matches], thousands, decimal
         )
-        odd = [cell for cell, match in zip(cells, matches, strict=True) if not match]
-        lost = [cell for cell in odd if cell.lower() not in NO_VALUE]
-        return Series(name, values, unit or units.popitem()[0]), lost
+        empty = {row for row, cell in enumerate(cells) if cell.lower() in NO_VALUE}
+        lost = [row for row, match in enumerate(matches) if not match and row not in empty]
+        return replace(series, values=values, unit=series.unit or units.popitem()[0]), lost, []
     if (count := len(set(cells))) > _MOST_TEXTS:
         raise RecordingError(f"it has {count} different texts")
-    return series_of_texts(name, cells), []
+    return series_of_texts(series.name, cells), [], []
 
 
 def _grouped(cells: Sequence[str], decimal: str) -> str:
