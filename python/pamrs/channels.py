@@ -34,7 +34,7 @@ COMMANDED: Final = (
     "vorgabe"
 )
 MEASURED: Final = "act actual ist istwert meas measured mess messwert fb feedback sensor gauge"
-_PRESSURE: Final = "pressure druck p press air luft"
+_PRESSURE: Final = "pressure druck p press air luft presion pression"
 _OUTSIDE: Final = "ambient umgebung room raum"
 
 
@@ -112,7 +112,7 @@ CHANNELS: Final[dict[str, Channel]] = {
         Channel("time", "s"),
         Channel(
             "valve_command", "V", -1000.0, 1000.0, "valve",
-            "valve ventil servo spool uvalve", f"u ao voltage volt input {COMMANDED}",
+            "valve ventil valvula vanne servo spool uvalve", f"u ao voltage volt input {COMMANDED}",
             "voltage of the valve", "command driven needed",
         ),
         Channel(
@@ -125,7 +125,8 @@ CHANNELS: Final[dict[str, Channel]] = {
         Channel(
             "supply_pressure", "Pa", -1.3e5, 1e8, "supply",
             "supply tank reservoir source versorgung psup ps psupply ptank vorrat speise kessel "
-            "behälter behaelter regulator regler vordruck netzdruck zuluft upstream", _PRESSURE,
+            "behälter behaelter regulator regler vordruck netzdruck zuluft upstream suministro "
+            "alimentacion alimentation", _PRESSURE,
             "pressure in the tank or behind the regulator", "pressure clips strong steady",
         ),
         Channel(
@@ -135,22 +136,23 @@ CHANNELS: Final[dict[str, Channel]] = {
         ),
         Channel(
             "muscle_pressure", "Pa", -1.3e5, 1e8, "chamber",
-            "muscle pam mckibben muskel chamber kammer pm p1 pmuscle",
+            "muscle pam mckibben muskel musculo chamber kammer pm p1 pmuscle",
             f"{_PRESSURE} actuator bladder tank",
             "pressure in the muscle or its chamber", "pressure clips needed",
         ),
         Channel(
             "joint_angle", "rad", -100.0, 100.0, "joint",
-            "angle winkel theta phi encoder enc", "joint position pos q elbow knee",
+            "angle winkel angulo theta phi encoder enc", "joint position pos q elbow knee",
             "angle of the joint", "needed rests moves",
         ),
         Channel(
             "length", "m", -100.0, 100.0, "load",
-            "length laenge länge stroke displacement weg lvdt disp", "x position pos laser",
+            "length laenge länge longitud longueur stroke displacement weg lvdt disp",
+            "x position pos laser",
             "length of the muscle", "needed rests moves",
         ),
         Channel(
-            "force", "N", -1e7, 1e7, "load", "force kraft loadcell", "load cell f fz",
+            "force", "N", -1e7, 1e7, "load", "force kraft fuerza loadcell", "load cell f fz",
             "pull of the muscles, by a load cell", "needed clips extra",
         ),
         Channel(

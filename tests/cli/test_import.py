@@ -154,7 +154,7 @@ def test_no_rig_and_another_rig_are_told(tmp_path: Path, run: Any) -> None:
 
 
 def test_without_a_folder_it_is_printed(tmp_path: Path, run: Any) -> None:
-    np.savez("run.npz", p1=np.linspace(0.0, 4.0, 100))
+    np.savez("run.npz", p1_bar=np.linspace(0.0, 4.0, 100))
     code, out, _ = run("run.npz", "--sample-time", "5 ms")
     assert code == 0
     assert 'schema = "pamrs.case/1"' in out

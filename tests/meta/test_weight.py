@@ -22,16 +22,16 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = {
     ".": 1109,
     "campaigns": 1097,
-    "cli": 1419,
+    "cli": 1423,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11043,
+    "diagnosis": 11068,
     "effects": 404,
     "experiments": 1052,
     "findings": 947,
     "fit": 2937,
     "library": 71,
-    "recordings": 4864,
+    "recordings": 5161,
     "report": 2059,
     "rig": 2222,
     "rigs": 139,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27216,
+    "tests": 27375,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1198,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37044
+MOST = 37370
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

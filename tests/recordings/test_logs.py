@@ -100,7 +100,7 @@ def test_a_cell_that_is_no_number_is_a_missing_sample_and_told(tmp_path: Path) -
     rows = "".join(f"{i},{'oops' if i == 7 else i}\n" for i in range(40))
     log = text_log(tmp_path, "t,p\n" + rows)
     assert np.flatnonzero(np.isnan(log.find("p").values)).tolist() == [7]
-    assert log.remarks == ["p: 1 cell is no number ('oops'): taken as missing"]
+    assert log.remarks == ["p: 1 cell is no number ('oops'): taken as missing, in row 9"]
 
 
 def test_names_that_are_not_there(tmp_path: Path) -> None:

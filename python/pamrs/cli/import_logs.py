@@ -28,8 +28,8 @@ def import_command(
         list[Path],
         typer.Argument(
             help=(
-                "Logs of one rig: CSV and other text, Excel, Parquet, Feather, MATLAB, HDF5, MF4, "
-                "TDMS, ROS bags, MCAP, NumPy. They are not changed."
+                "Logs of one rig: CSV and other text, JSON, Excel, Parquet, Feather, MATLAB, HDF5, "
+                "MF4, TDMS, ROS bags, MCAP, NumPy. They are not changed."
             )
         ),
     ],
@@ -63,6 +63,7 @@ def import_command(
     file = None if out is None else out / "case.toml"
     if file is not None:
         check_new(file)
+    from pamrs.diagnosis.ready import questions
     from pamrs.recordings import propose
     from pamrs.recordings.logs import TextFormat, check_readable
 
@@ -76,6 +77,9 @@ def import_command(
     step = None if sample_time is None else _spacing(sample_time)
     with progress(f"reading {len(log)} log{'s' if len(log) > 1 else ''}"):
         proposal = propose(log, model, sample_time=step, form=form)
+        if model is not None:
+            for item in proposal.logs:
+                item.remarks.extend(questions(item, model))
     for item in proposal.logs:
         _show(item)
     folder = out or Path()

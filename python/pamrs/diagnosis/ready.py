@@ -13,11 +13,14 @@ from pamrs.diagnosis.fit import holdable, without_passing
 from pamrs.diagnosis.prepare import (
     Block,
     at_ambient,
+    available_blocks,
     blocks_with_tanks,
     check_plausible,
     implausible,
     noted_units,
+    prepare,
     suspected_units,
+    turned_about,
     uncommanded,
     unusable,
     varying,
@@ -30,14 +33,19 @@ from pamrs.diagnosis.prepare import (
 )
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
-from pamrs.errors import DiagnosisError
+from pamrs.errors import DiagnosisError, RecordingError
 from pamrs.findings import Faulty
-from pamrs.recordings import Case, Recording
+from pamrs.recordings import Case, LogProposal, Recording, ambient_of
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig
 
-__all__ = ["Ready", "left_out", "readied"]
+__all__ = ["Ready", "left_out", "questions", "readied"]
+
+_LOOKED_AT = 20_000
+"""Samples of a proposed recording that are looked at: all of a log would take long."""
+_ASKED = 8
+"""Questions about a log, at most."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +125,38 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
         )
         raise DiagnosisError("\n".join([message, *suspected]))
     return Ready(case, blocks, suspected, doubts, [*copies, *notes], masked, [*dead, *clipped])
+
+
+def questions(proposed: LogProposal, rig: Rig) -> list[str]:
+    """Questions about a proposed log that a diagnosis would refuse, before it becomes a case.
+
+    Parameters
+    ----------
+    proposed : LogProposal
+        Of one log.
+    rig : Rig
+        The nominal model.
+
+    Returns
+    -------
+    list of str
+        Why :func:`readied` would refuse it; empty for a sound log, or one without a clock.
+    """
+    settings, found = DiagnosisSettings(), list[str]()
+    try:
+        recordings = proposed.recordings(ambient_of(rig))
+    except RecordingError as error:
+        return [str(error)]
+    core = core_rig(rig)
+    for recording in recordings:
+        last = min(recording.duration, _LOOKED_AT * recording.sample_time)
+        part = recording.between(stop=last)
+        odd = implausible(part, rig, settings)
+        blocks = [] if odd else available_blocks(rig, tuple(part.channels))
+        if blocks and not unusable(part, rig, core, settings):
+            odd = turned_about(blocks, [prepare(part, rig, settings)], core)
+        found += odd
+    return list(dict.fromkeys(found))[:_ASKED]
 
 
 def left_out(case: Case, fault: Callable[[Recording], str]) -> tuple[Case, list[str]]:

@@ -11,7 +11,7 @@ of every format, :mod:`pamrs.recordings.calibration` what their numbers stand fo
 from pamrs.channels import CHANNELS
 from pamrs.recordings._case import Case, load_case, model_and_case
 from pamrs.recordings._case_keys import CASE_KEYS
-from pamrs.recordings._doubts import Suspicion, suspicions
+from pamrs.recordings._doubts import Suspicion, ambient_of, suspicions
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
 from pamrs.recordings._in_memory import is_table
@@ -29,6 +29,7 @@ __all__ = [
     "Proposal",
     "Recording",
     "Suspicion",
+    "ambient_of",
     "channels_of",
     "is_table",
     "load_case",

@@ -13,6 +13,7 @@ import numpy as np
 from pamrs._arrays import Array
 
 _MOMENT: Final = re.compile(
+    r"(?:(?P<days>[-+]?\d+) days? \+?)?"
     r"(?:(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})(?P=mark)(?P<c>\d{1,4})(?:,? +|T))?"
     r"(?:(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}(?:[.,:]\d+)?))?"
     r"|(?P<minutes>\d{1,2}):(?P<seconds>\d{2}[.,]\d+))"
@@ -52,6 +53,12 @@ def is_moment(cell: str) -> bool:
     return _match(cell) is not None
 
 
+def is_date(cell: str) -> bool:
+    """True where a text is a date without a time of day."""
+    match = None if is_moment(cell) else _match(f"{cell} 0:00")
+    return match is not None and match["a"] is not None
+
+
 def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
     """Seconds since the first of some dates or times of day.
 
@@ -77,7 +84,9 @@ def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
     days: dict[tuple[str, str, str], float] = {}
     passed, before, first = 0.0, -math.inf, math.nan
     whole = 3600.0 if there[0]["minutes"] else _DAY
-    for row, match in enumerate(found):
+    day = [_seconds_of_day(match) for match in there if match["a"] is None]
+    newest_first = np.mean(np.diff(day) < 0.0) > 0.5 if len(day) > 1 else False
+    for row, match in list(enumerate(found))[:: -1 if newest_first else 1]:
         if match is None:
             continue
         value = _seconds_of_day(match)
@@ -147,14 +156,14 @@ def _day(written: tuple[str, str, str], month_first: bool) -> float:
 
 
 def _seconds_of_day(match: re.Match[str]) -> float:
-    """Seconds since midnight, UTC where the text says its zone."""
+    """Seconds since midnight, UTC where the text says its zone; of a duration all of it."""
     if match["minutes"]:
         return int(match["minutes"]) * 60.0 + float(match["seconds"].replace(",", "."))
     hour = int(match["hour"])
     if match["half"]:
         hour = hour % 12 + (12 if match["half"] in "Pp" else 0)
     seconds = float((match["second"] or "0").replace(",", ".").replace(":", "."))
-    value = hour * 3600.0 + int(match["minute"]) * 60.0 + seconds
+    value = int(match["days"] or 0) * _DAY + hour * 3600.0 + int(match["minute"]) * 60.0 + seconds
     zone = match["zone"]
     if zone:
         away = int(zone[1:3]) * 3600.0 + int(zone[-2:]) * 60.0

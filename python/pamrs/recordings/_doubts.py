@@ -27,6 +27,7 @@ _TOP: Final = 0.995  # quantile that stands for the largest value, spikes left o
 _LOW: Final = 0.005
 _HIGHEST: Final = 25e5  # no pneumatic muscle or its supply goes higher, without a rig to ask [Pa]
 _RATED: Final = (0.6, 1.5)  # a tank beside what the rig file says of it
+_LEAST: Final = 0.02  # of the supply, which a muscle is filled to at the least
 _OVER: Final = 1.15  # a muscle beside what feeds it
 _CONNECTED: Final = 0.2  # of what the rig file says, from which a supply's gauge is believed
 _REST: Final = 0.02  # share of the samples that rest at the lowest level
@@ -34,6 +35,9 @@ _STAYS: Final = 0.8  # of the samples near it that are there: a curve that passe
 _NEAR: Final = 0.06  # of the ambient pressure, beside which a level counts as ambient
 _AMBIENT_OFF: Final = 0.02  # of the stated ambient pressure; a gauge and weather do less
 _VOLTS: Final = 30.0  # no valve is commanded with more
+_TURNS: Final = (-2.0 * np.pi, 2.0 * np.pi)  # [rad] no joint goes farther
+_LENGTHS: Final = (1e-3, 3.0)  # [m] no muscle is shorter or longer
+_STILL: Final = 0.02  # of the range that is allowed; a recording has more
 _NEWTONS: Final = 5e4  # no muscle pulls more
 _SLACK: Final = 0.25  # of an allowed range, which may be left at its ends
 
@@ -188,8 +192,9 @@ def _fed_by(
     if channel_of(name) == "supply_pressure":
         return rated
     recorded = _recorded_supply(channels, said, rig)
-    # a gauge that is not connected tells nothing of what it should measure
-    connected = recorded > 0.0 and (rated is None or recorded > _CONNECTED * rated[0])
+    # a gauge that is not connected, or that is the muscle's, tells nothing of its supply
+    lowest = max(0.0, _level(channels[name], _LOW))
+    connected = recorded > lowest and (rated is None or recorded > _CONNECTED * rated[0])
     return (recorded, "the recorded supply") if connected else rated
 
 
@@ -243,7 +248,7 @@ def _pressure(
     most = (_RATED[1] if supply else _OVER) if beside else 1.0
     wrong = top > 0.0 and not least <= top / reference <= most
     if wrong and not _agrees(name, top, unit, channels, said):
-        likely = _fitting(top, unit, reference, least if least else 0.02, most)
+        likely = _fitting(top, unit, reference, least or _LEAST, most)
         if likely:
             turned = float(_other(top, unit, likely))
             now, other = (_in_both(unit, "Pa", rig, value) for value in (top, reference))
@@ -340,25 +345,32 @@ def _temperature(name: str, unit: str, values: Array, rig: Rig | None) -> Iterat
             return
 
 
+def _room(name: str, rig: Rig | None) -> tuple[float, float, float]:
+    """Limits of an angle or a length by the rig file, and what it may go beyond them; without a
+    rig file those of every stand, and nothing [SI].
+    """
+    given = limits_of(rig, name)
+    low, high = given or (_TURNS if channel_of(name) == "joint_angle" else _LENGTHS)
+    return low, high, _SLACK * (high - low) if given else 0.0
+
+
 def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Suspicion]:
     """Doubt the unit of an angle or a length outside the rig's limits, else the usual range."""
     angle = channel_of(name) == "joint_angle"
-    given = limits_of(rig, name)
-    low, high = given or ((-2.0 * np.pi, 2.0 * np.pi) if angle else (1e-3, 10.0))
-    slack = _SLACK * (high - low) if given else 0.0
+    low, high, slack = _room(name, rig)
     bottom, top = _level(values, _LOW), _top_of(values)
 
     def fits(first: float, last: float) -> bool:
         return low - slack <= first and last <= high + slack
 
-    if fits(bottom, top) and not (given and top - bottom < 0.02 * (high - low)):
+    if fits(bottom, top) and not (slack and top - bottom < _STILL * (high - low)):
         return
     for other in ("deg", "rad", "mrad", "rev") if angle else ("m", "mm", "cm", "in", "um"):
         if _as_large(other, unit):
             continue
         first, last = (float(_other(edge, unit, other)) for edge in (bottom, top))
         if fits(first, last) and last - first > 5.0 * (top - bottom) * fits(bottom, top):
-            ends = "the rig file allows" if given else "possible are"
+            ends = "the rig file allows" if slack else "possible are"
             si = "rad" if angle else "m"
             own = unit if rig is None else rig.units.usual(si)
             now, then, wide = (
@@ -403,22 +415,20 @@ def assumed_unit(name: str, values: Array, rig: Rig | None, stated: str) -> tupl
     numbers = f"its numbers are {low:.4g} to {high:.4g}"
     if CHANNELS[channel].unit == "Pa":
         return _pressure_unit(channel, _top_of(values), rig, stated, numbers)
-    limits = limits_of(rig, name)
-    choices = {"joint_angle": ("rad", "deg"), "length": ("m", "mm")}.get(channel)
-    if choices and limits:
-        slack = 0.25 * (limits[1] - limits[0])
-        for unit in choices:
-            scale = parse_unit(unit).scale
-            if limits[0] - slack <= low * scale and high * scale <= limits[1] + slack:
-                return unit, f"{numbers}, which in {unit} lies where the rig file allows it"
-    most = max(abs(low), abs(high))
-    if channel == "joint_angle":
-        return ("rad" if most <= 6.3 else "deg"), numbers
-    if channel == "length":
-        return ("m" if most <= 3.0 else "mm"), numbers
+    units = {"joint_angle": ("rad", "deg"), "length": ("m", "mm")}.get(channel)
+    if units:
+        first, last, slack = _room(name, rig)
+        ends = {u: (low * parse_unit(u).scale, high * parse_unit(u).scale) for u in units}
+        fit = [u for u, (a, b) in ends.items() if first - slack <= a and b <= last + slack]
+        if len(fit) > 1:  # a stand hardly stays within so little of what it can do
+            fit = [u for u in fit if ends[u][1] - ends[u][0] >= _STILL * (last - first)]
+        where = "the rig file allows it" if slack else "it can be"
+        if len(fit) != 1:
+            return "", f"{numbers}, which does not lie in one of {', '.join(units)} where {where}"
+        return fit[0], f"{numbers}, which in {fit[0]} lies where {where}"
     if channel in ("temperature", "ambient_temperature"):
         return ("K" if low > 200.0 else "degC"), numbers
-    usual = CHANNELS[channel].unit.replace("N m", "Nm")
+    most, usual = max(abs(low), abs(high)), CHANNELS[channel].unit.replace("N m", "Nm")
     if most > (_VOLTS if usual == "V" else _NEWTONS):
         return "", f"{numbers}, too large for {usual}"
     return usual, f"{numbers}, and {usual} is what it is usually logged in"
@@ -430,7 +440,7 @@ def _pressure_unit(
     """Unit of pressure with which the maximum fits the supply, and words on the choice."""
     supplies = rig.tables("supply").values() if rig else ()
     reference = max([0.0, *(float(table["initial_pressure"]) for table in supplies)]) or 8e5
-    least, most = (0.6, 1.5) if channel == "supply_pressure" else (0.03, 1.1)
+    least, most = _RATED if channel == "supply_pressure" else (_LEAST, 1.1)
     if channel == "ambient_pressure":
         reference, least, most = AMBIENT, 0.5, 1.15
 
@@ -444,8 +454,9 @@ def _pressure_unit(
     fitting = [unit for unit in _UNITS if fits(unit)]
     if not fitting:
         return "", f"{numbers}, which is no likely pressure here in any of {', '.join(_UNITS)}"
-    others = f"; {' or '.join(fitting[1:])} would fit, too" if fitting[1:] else ""
-    return fitting[0], numbers + others
+    if len(fitting) > 1:
+        return "", f"{numbers}, which may be {' or '.join(fitting)}"
+    return fitting[0], numbers
 
 
 def subtracted(recorded: Array | None, stated: float | None, unit: str) -> tuple[float, str]:

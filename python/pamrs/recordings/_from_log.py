@@ -21,7 +21,7 @@ from pamrs.recordings._recording import Issue, Recording
 from pamrs.recordings._several_clocks import Sampled, recording_of, sampled
 from pamrs.recordings._splitting import Cut, Split, parts, read_split
 from pamrs.recordings._stamps import Ticks, counted_on, ticks, unit_of_stamps
-from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
+from pamrs.recordings.logs import Log, Series, TextFormat, read_log, switched, understood_unit
 from pamrs.recordings.table import stem_of
 from pamrs.units import same_dimension, to_si
 
@@ -248,7 +248,7 @@ def _with_remarks(
 
 def _sampled(log: Log, item: Source, clocks: Clocks, clock: Clock) -> Sampled:
     """Values and times of one channel in SI; rows without a time are left out."""
-    series = log.find(item.column)
+    series = switched(log.find(item.column))
     if series.labels:
         raise RecordingError(
             f"{log.path}: {item.column!r} holds texts like {series.labels[0]!r}, no numbers for "
@@ -259,6 +259,13 @@ def _sampled(log: Log, item: Source, clocks: Clocks, clock: Clock) -> Sampled:
         raw, said = counted_on(raw)
     made = sampled(item.channel, item.si(raw), clocks.of(series, clock), _si_unit(item), item.hold)
     return replace(made, remarks=(said, *made.remarks)) if said else made
+
+
+def unit_of_clock(series: Series) -> tuple[str, str]:
+    """Unit of the times in a series: what the log says, else by name and size; and a remark."""
+    known = understood_unit(series.unit)
+    said = known.unit if known is not None and same_dimension(known.unit, "s") else ""
+    return unit_of_stamps(series.values, series.name, said)
 
 
 class Clocks:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
+from unicodedata import normalize
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from pamrs.channels import (
     with_trait,
 )
 from pamrs.recordings._doubts import PRESSURES, ambient_of, assumed_unit, subtracted
-from pamrs.recordings.logs import Series, Written, understood_unit
+from pamrs.recordings.logs import Series, Written, switched, understood_unit
 from pamrs.rig import Rig
 from pamrs.units import parse_unit, same_dimension
 
@@ -118,11 +119,12 @@ class Open:
 
 
 def words_of(name: str) -> list[str]:
-    """Words of a name in small letters: ``AI/pMuscle_1`` has ai, p, muscle, 1. Words that are
-    written as one are parted too: ``Solldruck`` is solldruck, soll and druck.
+    """Words of a name in small letters, without accents: ``AI/pMuscle_1`` has ai, p, muscle, 1.
+    Words that are written as one are parted too: ``Solldruck`` is solldruck, soll and druck.
     """
-    parted = re.sub(r"(?<=[a-zäöü])(?=[A-Z])", " ", name)
-    words = [word for word in re.split(r"[^0-9a-zäöüß]+", parted.lower()) if word]
+    parted = re.sub(r"(?<=[a-zäöü])(?=[A-Z])", " ", name).lower()
+    plain = "".join(c if c in "äöü" else normalize("NFD", c)[0] for c in normalize("NFC", parted))
+    words = [word for word in re.split(r"[^0-9a-zäöüß]+", plain) if word]
     return [part for word in words for part in (word, *_joined(word))]
 
 
@@ -201,6 +203,7 @@ def matched(
     remarks : list of str
         Units that were assumed, absolute pressures, and commands that this rig has not.
     """
+    candidates = [switched(each) for each in candidates]
     pairs: list[tuple[float, bool, int, int]] = []
     kinds = [channel_of(name) for name in wanted]
     for row, series in enumerate(candidates):
@@ -261,6 +264,12 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
         text = f"{series.name} {why}: give from and to, its calibration"
         return Open(name, series.name, usual, electric or (0.0, 1.0), text)
     called = f"{series.name} is called like {name}"
+    levels = switch_levels(series)
+    if channel in _COMMANDS and levels:
+        text = (
+            f"{called}, and is {levels}, a switch: give from = [0, 1] and to, what these stand for"
+        )
+        return Open(name, series.name, usual, (0.0, 1.0), text)
     if series.unit.strip(" -1[](){}"):
         text = (
             f"{called}, but the unit {series.unit!r} is not known: give a unit, and scale and "
@@ -270,6 +279,8 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
     unit, why = assumed_unit(name, series.values, rig, stated)
     if _AIR & set(words_of(series.name)) and channel in PRESSURES:
         unit, why = "", "ATM in its name may be the unit, or say that it is the air outdoors"
+    if channel == "valve_command" and not _VOLTAGES & set(words_of(series.name)):
+        unit, why = "", "it may be a voltage, or what a pressure or an angle is to be"
     if not unit:
         text = f"{called}, and has no unit in the log: {why}; give it"
         return Open(name, series.name, usual, (), text)
@@ -277,7 +288,22 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
     return Match(name, series, unit, absolute, assumed=why)
 
 
+def switch_levels(series: Series) -> str:
+    """Words for the two values of a switch; empty for a series that is none."""
+    good = series.values[np.isfinite(series.values)]
+    if understood_unit(series.unit) or not np.isin(good, (0.0, 1.0)).all():
+        return ""
+    off, _, on = series.unit.partition("/")
+    return f"0 for {off} and 1 for {on}" if on else "0 or 1"
+
+
 _AIR: Final = frozenset(("atm",))
+#: Words of valves and of voltages: what is called a set point alone may be of any channel.
+_VOLTAGES: Final = (
+    CHANNELS["valve_command"].strong
+    | CHANNELS["valve_command"].weak - _COMMANDED
+    | {"cmd", "command"}
+)
 _ABSOLUTE: Final = frozenset(("abs", "absolute", "absolut"))
 _READINGS: Final[dict[str, tuple[float, ...]]] = {"A": (4.0, 20.0), "V": (0.0, 10.0)}
 """What transmitters give, from the lower end of their range to the upper one."""

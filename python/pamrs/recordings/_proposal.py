@@ -18,7 +18,7 @@ from pamrs.channels import CHANNELS, channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import usual_interval
 from pamrs.recordings._doubts import suspicions
-from pamrs.recordings._from_log import Clocks
+from pamrs.recordings._from_log import Clocks, load_recordings, unit_of_clock
 from pamrs.recordings._mapping import Clock
 from pamrs.recordings._matching import (
     NOT_A_CHANNEL,
@@ -28,11 +28,12 @@ from pamrs.recordings._matching import (
     matched,
     words_of,
 )
+from pamrs.recordings._recording import Recording
 from pamrs.recordings._several_clocks import SLOW, UNTOLD, Sampled, sampled
 from pamrs.recordings._splitting import Cut, Split, stretches_of
-from pamrs.recordings._stamps import CLOCK_WORDS, Ticks, ticks, unit_of_stamps
+from pamrs.recordings._stamps import CLOCK_WORDS, Ticks, filled_rows, ticks
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
-from pamrs.recordings.table import stem_of
+from pamrs.recordings.table import stem_of, told_few
 from pamrs.rig import Rig
 from pamrs.units import parse_unit, same_dimension
 
@@ -114,6 +115,54 @@ class LogProposal:
     remarks: list[str] = field(default_factory=list)
     name: str = ""
 
+    @property
+    def channels(self) -> dict[str, dict[str, Any]]:
+        """The key ``channels``."""
+        found = {}
+        for match in self.matches:
+            unit = f"{match.unit}(a)" if match.absolute else match.unit
+            entry: dict[str, Any] = {"column": match.series.name, "unit": unit}
+            if match.calibration is not None:
+                entry["from"], entry["to"] = map(list, match.calibration)
+            if match.assumed:
+                entry["assumed"] = match.assumed
+            if match.time and match.time != self.time:
+                entry["time"] = match.time
+            if match.hold:
+                entry["hold"] = True
+            found[match.channel] = entry
+        return found
+
+    def recordings(self, ambient_pressure: float | None = None) -> list[Recording]:
+        """Recordings of the log as proposed.
+
+        Parameters
+        ----------
+        ambient_pressure : float, optional
+            What is subtracted from absolute pressures [Pa].
+
+        Returns
+        -------
+        list of Recording
+            Empty where no channel was recognised, or one has no clock.
+
+        Raises
+        ------
+        RecordingError
+            If a channel cannot be what it is proposed as.
+        """
+        if not self.matches or any(not m.time and m.series.time is None for m in self.matches):
+            return []
+        return load_recordings(
+            self.log.path,
+            channels=self.channels,
+            time=self.time or None,
+            split=self.split,
+            pieces=self.pieces or None,
+            log=self.log,
+            ambient_pressure=ambient_pressure,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
@@ -154,10 +203,14 @@ class Proposal:
         """
         if not any(item.matches for item in self.logs):
             names = ", ".join(str(item.log.path) for item in self.logs)
+            series = told_few(
+                [each.name for item in self.logs for each in item.listed], _MOST_UNUSED
+            )
             left = "".join(f"\n{each.text}" for item in self.logs for each in item.left)
             raise RecordingError(
-                f"{names}: no channel was recognised; name the columns of a text without headings "
-                "(--columns, in Python TextFormat(columns=...)), or write case.toml by hand" + left
+                f"{names}: no channel was recognised among {series}; name the columns of a text "
+                "without headings (--columns, in Python TextFormat(columns=...)), or write "
+                "case.toml by hand" + left
             )
         lines = [
             "# Proposed by pamrs import from names, units and ranges: look at every line.",
@@ -205,20 +258,9 @@ class Proposal:
         lines = ["", *(f"# {shown(text)}" for text in said), "[[recording]]"]
         lines += [f"{key} = {_toml(value)}" for key, value in keys.items() if value is not None]
         lines.append("[recording.channels]")
-        for match in item.matches:
-            unit = f"{match.unit}(a)" if match.absolute else match.unit
-            entry: dict[str, Any] = {"column": match.series.name, "unit": unit}
-            if match.calibration is not None:
-                entry["from"], entry["to"] = map(list, match.calibration)
-            if match.assumed:
-                entry["assumed"] = match.assumed
-            if match.time and match.time != item.time:
-                entry["time"] = match.time
-            if match.hold:
-                entry["hold"] = True
-            lines.append(f"{_key(match.channel)} = {_toml(entry)}")
+        lines += [f"{_key(name)} = {_toml(entry)}" for name, entry in item.channels.items()]
         for each in item.left:
-            entry = {"column": each.series, "unit": each.unit}
+            entry: dict[str, Any] = {"column": each.series, "unit": each.unit}
             if each.readings:
                 entry |= {"from": list(each.readings), "to": [0, 1]}
             lines += [f"# {shown(each.text)}:", f"# {_key(each.channel)} = {_toml(entry)}"]
@@ -339,6 +381,7 @@ def _proposal(
         told = ", ".join(_spoken(name, rig) for name in missing)
         remarks.append(f"not found in this log: {told}")
     stepped = [known[m.channel] for m in matches if not m.hold and m.channel in known]
+    stepped += [clock for each in candidates if (clock := clocks.of(each)) is not None]
     split, pieces, short = _split(log, stepped[0] if stepped else None)
     taken = {each.series.name for each in matches} | {each.series for each in left}
     taken |= {split["column"]} if isinstance(split, dict) and "column" in split else set()
@@ -370,8 +413,7 @@ def _unused(names: list[str]) -> list[str]:
     """Remark on series that are no channel, at most one."""
     if not names:
         return []
-    more = f" and {len(names) - _MOST_UNUSED} more" if len(names) > _MOST_UNUSED else ""
-    told = f"{', '.join(names[:_MOST_UNUSED])}{more}"
+    told = told_few(names, _MOST_UNUSED)
     return [f"not used: {told}; where one is a channel of the rig, name it in case.toml"]
 
 
@@ -384,7 +426,9 @@ def _spoken(channel: str, rig: Rig) -> str:
 
 
 def _like_a_clock(series: Series) -> bool:
-    """True where a series has the name of a clock or holds time stamps, and rises."""
+    """True where a series has the name of a clock, holds time stamps or is in a unit of time, and
+    rises.
+    """
     words = words_of(series.name)
     called = bool(words) and (words[-1] in CLOCK_WORDS or words[0] in CLOCK_WORDS)
     called |= series.stamps or words == ["x", "value"]  # LabVIEW calls its time X_Value
@@ -392,10 +436,11 @@ def _like_a_clock(series: Series) -> bool:
     if known is not None and not same_dimension(known.unit, "s"):
         return False
     good = series.values[np.isfinite(series.values)]
-    if series.labels or not called or len(good) < 2:
+    if series.labels or not (called or known) or len(good) < 2:
         return False
     steps = np.diff(ticks(good).time)
-    return bool(np.mean(steps >= 0.0) > 0.9) and bool(np.any(steps > 0.0))
+    rises = steps >= 0.0 if called else steps > 0.0  # a duration may stay and rise at times
+    return bool(np.mean(rises) > 0.9) and bool(np.any(steps > 0.0))
 
 
 class _Clocks:
@@ -427,9 +472,7 @@ class _Clocks:
             return fine, near, "header" in words_of(other.name), -len(other.name)
 
         best = max(fitting, key=rank)
-        known = understood_unit(best.unit)
-        said = known.unit if known is not None and same_dimension(known.unit, "s") else ""
-        unit, remark = unit_of_stamps(best.values, best.name, said)
+        unit, remark = unit_of_clock(best)
         if remark and remark not in self.remarks:
             self.remarks.append(remark)
         return {"column": best.name, "unit": unit}
@@ -443,17 +486,18 @@ class _Clocks:
             made = self._clocks.of(series, Clock(entry.get("column"), entry.get("unit")))
         except RecordingError:  # no time in any row
             return None
-        said = [text for text in (*made.remarks, made.spread[1]) if text]
+        spread = made.spread[1] if filled_rows(series.values) is None else ""
+        said = [text for text in (*made.remarks, spread) if text]
         self.remarks += [text for text in said if text not in self.remarks]
         return made
 
     def _compare(self, used: Series) -> None:
         """Say by how much another clock of the same rows lags behind the one that is used."""
-        mine = used.values * parse_unit(unit_of_stamps(used.values, used.name)[0]).scale
+        mine = used.values * parse_unit(unit_of_clock(used)[0]).scale
         for other in self._rising:
             if other is used or len(other.values) != len(mine):
                 continue
-            scale = parse_unit(unit_of_stamps(other.values, other.name)[0]).scale
+            scale = parse_unit(unit_of_clock(other)[0]).scale
             away = other.values * scale - mine
             away = away[np.isfinite(away)]
             if len(away) and float(np.max(np.abs(away))) < 60.0:
@@ -506,9 +550,9 @@ def _listed(series: Series, clock: Ticks | None, matches: Sequence[Match]) -> Li
     if series.labels:
         good = good[:0]
     low, high = (float(good.min()), float(good.max())) if good.size else (np.nan, np.nan)
-    times = np.empty(0) if clock is None else sampled("", series.values, clock, "").time
-    rate = _rate(times, len(series.values))
     channel = next((match.channel for match in matches if match.series is series), "")
+    times = np.empty(0) if clock is None else sampled(channel, series.values, clock, "").time
+    rate = _rate(times, len(series.values))
     return Listed(series.name, len(series.values), rate, series.unit, low, high, channel)
 
 

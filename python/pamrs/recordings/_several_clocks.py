@@ -13,7 +13,7 @@ from pamrs.channels import channel_of, with_trait
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import GAP, Grid, check_samples, gaps, usual_interval
 from pamrs.recordings._recording import Issue, Laid, Recording, assemble, composed
-from pamrs.recordings._stamps import Rows, Ticks, filled_rows, spread, unwound
+from pamrs.recordings._stamps import Rows, Ticks, filled_rows, reading_rows, spread, unwound
 
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
 #: A diagnosis can do without them: they need not last as long as the others.
@@ -86,19 +86,25 @@ def sampled(name: str, values: Array, clock: Ticks, unit: str, hold: bool = Fals
     -------
     Sampled
         A channel that has values in few rows only has their times: a slower one is no fault, and a
-        command holds until it is written again.
+        command holds until it is written again. So has one whose readings the log repeats.
     """
     values = values[clock.rows]
     remarks: list[str] = []
     if unit == "rad":
         values, said = unwound(values)
         remarks += [said] if said else []
+    commanded = channel_of(name) in COMMANDS
     places = np.flatnonzero(np.isfinite(values)) if hold else filled_rows(values)
-    if places is None or len(places) == len(values):
+    repeated = None if hold or commanded else reading_rows(values)
+    if repeated is not None:
+        places, stay = repeated
+        rate = 1.0 / max(float(np.median(np.diff(clock.time[places]))), 1e-12)
+        remarks.append(f"each reading stays for {stay:g} rows: {rate:.2g} Hz, each counts once")
+    elif places is None or len(places) == len(values):
         time = clock.time if hold else clock.spread[0]
         return Sampled(name, values, time, unit, hold, clock, None, tuple(remarks))
-    if not hold:
-        hold = channel_of(name) in COMMANDS
+    elif not hold:
+        hold = commanded
         told = "held until the next one" if hold else "taken as sampled at their own times"
         remarks.append(f"{len(places)} of {len(values)} rows have a value of it: {told}")
     time = clock.time[places] if hold else spread(clock.time[places])[0]

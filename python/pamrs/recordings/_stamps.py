@@ -48,6 +48,11 @@ _LATE: Final = 20  # rows that may come late, one after the other
 _MANY: Final = 50  # stamps between pauses from which on a line through their rows is known
 _NEWEST_FIRST: Final = 0.02  # steps forward for each one back, of logs with the newest row first
 _LEAST_STEP: Final = 0.05  # usual steps; rows that are nearer to each other are as good as at once
+_LEAST_READINGS: Final = 8  # after which a sensor is known to be slower than its log
+_LEAST_STAY: Final = 2.5  # rows of each of them
+_UNEVEN: Final = 0.3  # of the usual stay, by which one may be longer or shorter
+_EVENLY: Final = 0.9  # of the stays are no longer or shorter
+_SIZES: Final = 3  # different steps, at the least
 _SAME: Final = 3.0  # how far beyond the largest step of an angle one over a full turn may be
 
 
@@ -337,6 +342,44 @@ def filled_rows(values: Array) -> Rows | None:
     if len(filled) < 3 or float(np.median(np.diff(filled))) < 2.0:
         return None
     return filled
+
+
+def reading_rows(values: Array) -> tuple[Rows, float] | None:
+    """Rows at which the readings of a slow sensor begin that a fast log repeats until the next one.
+
+    Readings come evenly and their steps differ; a converter's slow ramp has steps of one size, and
+    noise changes from row to row.
+
+    Parameters
+    ----------
+    values : (n,) array
+        NaN where a cell is empty.
+
+    Returns
+    -------
+    rows : (m,) array of int
+        First row of each reading; of several that are equal, each has its own.
+    stay : float
+        Rows that a reading stays as a rule.
+    None where each row has a reading of its own.
+    """
+    good = np.flatnonzero(np.isfinite(values))
+    data = values[good]
+    edges = np.flatnonzero(np.diff(data)) + 1
+    stays = np.diff(edges)
+    if len(stays) < _LEAST_READINGS or (stay := float(np.median(stays))) < _LEAST_STAY:
+        return None
+    counts = np.maximum(np.rint(stays / stay), 1.0)
+    even = np.abs(stays / stay - counts) <= _UNEVEN * np.sqrt(counts)
+    sizes = np.abs(data[edges] - data[edges - 1])
+    if np.mean(even) < _EVENLY or len(np.unique(np.rint(1e6 * sizes / sizes.max()))) < _SIZES:
+        return None
+    first, last = (round(edge / stay) for edge in (edges[0], len(data) - edges[-1]))
+    before = np.maximum(edges[0] - stay * np.arange(first, 0, -1), 0)
+    found = [before, edges[-1] + stay * np.arange(max(last, 1))]
+    for start, lasting, count in zip(edges[:-1], stays, counts, strict=True):
+        found.append(start + lasting / count * np.arange(count))
+    return good[np.unique(np.rint(np.concatenate(found)).astype(int))], stay
 
 
 def unwound(angle: Array) -> tuple[Array, str]:

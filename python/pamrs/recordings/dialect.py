@@ -17,6 +17,10 @@ BESIDE_COMMAS: Final = re.compile(r"[-+]?(?:[1-9]\d{0,2}(?:\.\d{3})+|\d{1,3})(?:
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 _POINT = re.compile(r"[+-]?(\d+\.\d*|\.\d+)([eE][+-]?\d+)?")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")  # 1,234: a thousand, or one and a bit
+#: A number with its unit in one cell: ``2.31 bar``.
+QUANTITY: Final = re.compile(
+    r"(?P<number>[-+]?(?:\d[\d.,]*|[.,]\d+)(?:[eE][-+]?\d+)?)\s?(?P<unit>(?:[A-Za-z°µ%]\S{0,9})?)"
+)
 _GIVE: Final = "in the .toml description or to load_force_map"
 
 
@@ -59,8 +63,10 @@ def is_number(cell: str, decimal: str, thousands: str | None) -> bool:
 
 
 def is_useful(cell: str, decimal: str, thousands: str | None) -> bool:
-    """True where a cell is a number, a date or a time of day."""
-    return is_number(cell, decimal, thousands) or is_moment(cell)
+    """True where a cell is a number, perhaps with a unit, a date or a time of day."""
+    match = QUANTITY.fullmatch(cell)
+    number = match["number"] if match else cell
+    return is_number(number, decimal, thousands) or is_moment(cell)
 
 
 def dialect_of(

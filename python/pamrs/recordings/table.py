@@ -29,8 +29,10 @@ __all__ = [
     "Table",
     "has",
     "is_text",
+    "joined_rows",
     "lines_of",
     "lines_of_rows",
+    "numbers_of_cells",
     "read_table",
     "read_text",
     "renamed",
@@ -38,7 +40,7 @@ __all__ = [
     "split_rows",
     "stem_of",
     "thousands_of",
-    "told_cells",
+    "told_few",
     "told_rows",
     "usual_width",
 ]
@@ -169,12 +171,23 @@ class Table:
         cells = self.cells(index)
         if isinstance(cells, np.ndarray):
             return cells, []
-        return _numbers_of_cells(cells, thousands, decimal)
+        return numbers_of_cells(cells, thousands, decimal)
 
     def doubtful(self, index: int, decimal: str) -> bool:
         """True where only all cells of a column together show the format of its numbers."""
         matrix = self._matrices.get(decimal)
         return matrix is not None and index in matrix.whole
+
+    def told(self, index: int, rows: Sequence[int]) -> list[str]:
+        """Remark on cells of a column that are no numbers, in a list; empty where there are none:
+        ``3 cells are no numbers ('OL', '#N/A'): taken as missing, the first in row 7``.
+        """
+        if not rows:
+            return []
+        some = told_few(dict.fromkeys(repr(self.cell(index, row)[:20]) for row in rows))
+        count = "1 cell is no number" if len(rows) == 1 else f"{len(rows)} cells are no numbers"
+        first = f"{'the first ' * (len(rows) > 1)}in row {self.row_numbers[rows[0]]}"
+        return [f"{count} ({some}): taken as missing, {first}"]
 
     def samples(
         self, index: int, label: str, source: str, thousands: str | None, decimal: str
@@ -207,7 +220,7 @@ class Table:
         hint = _number_hint(cells[0], thousands, decimal)
         if len(strange) > len(values) // (20 if hint else 5):
             self.numbers(index, label, source, thousands, decimal)  # says which
-        return values, told_cells(cells)
+        return values, self.told(index, strange)[0]
 
     def numbers(
         self, index: int, label: str, source: str, thousands: str | None, decimal: str
@@ -251,7 +264,7 @@ def _matrix(body: Lines, decimal: str, width: int) -> _Matrix:
             continue
         columns = list(zip(*map(body.parted, lines), strict=True))
         for index in wanted:
-            own, odd = _numbers_of_cells(columns[index], None, decimal)
+            own, odd = numbers_of_cells(columns[index], None, decimal)
             values[index, start:stop] = own
             strange[index] += [start + row for row in odd]
             pointed = decimal == "," and any("." in cell for cell in columns[index])
@@ -280,9 +293,10 @@ def _parsed(
     return values if len(values) == len(lines) else None
 
 
-def _numbers_of_cells(
+def numbers_of_cells(
     cells: Sequence[str], thousands: str | None, decimal: str
 ) -> tuple[Array, list[int]]:
+    """Numbers of cells, NaN where there is none, and the places of those that are no numbers."""
     plain = [cell.replace(thousands, "") for cell in cells] if thousands else cells
     if decimal != ".":
         plain = [cell.replace(decimal, ".") for cell in plain]
@@ -303,12 +317,11 @@ def _numbers_of_cells(
     return values, strange
 
 
-def told_cells(cells: Sequence[str]) -> str:
-    """Remark on cells that are no numbers: ``3 cells are no numbers ('OL', '#N/A')``."""
-    words = list(dict.fromkeys(cell.strip()[:20] for cell in cells))
-    some = ", ".join(map(repr, words[:4])) + (" and so on" if len(words) > 4 else "")
-    count = "1 cell is no number" if len(cells) == 1 else f"{len(cells)} cells are no numbers"
-    return f"{count} ({some}): taken as missing"
+def told_few(texts: Iterable[str], most: int = 4) -> str:
+    """The first of some texts, parted by commas, and how many more there are."""
+    words = list(texts)
+    more = f" and {len(words) - most} more" if len(words) > most else ""
+    return ", ".join(words[:most]) + more
 
 
 def told_rows(numbers: Sequence[int], what: str) -> list[str]:
@@ -414,7 +427,7 @@ def lines_of(text: str, delimiter: str, source: str, comments: tuple[str, ...] =
         reader = csv.reader(kept, delimiter=delimiter)
         rows = ((reader.line_num, row) for row in reader)
         try:
-            return _joined((number, row) for number, row in rows if any(map(str.strip, row)))
+            return joined_rows((number, row) for number, row in rows if any(map(str.strip, row)))
         except csv.Error as error:
             raise RecordingError(
                 f"{source}: a quote that is opened in row {reader.line_num + 1} or before is not "
@@ -433,10 +446,11 @@ def lines_of(text: str, delimiter: str, source: str, comments: tuple[str, ...] =
 
 def lines_of_rows(rows: Iterable[Sequence[str]]) -> Lines:
     """Rows whose cells are parted already, as of a sheet; without empty ones."""
-    return _joined((number, row) for number, row in enumerate(rows, start=1) if any(row))
+    return joined_rows((number, row) for number, row in enumerate(rows, start=1) if any(row))
 
 
-def _joined(rows: Iterable[tuple[int, Sequence[str]]]) -> Lines:
+def joined_rows(rows: Iterable[tuple[int, Sequence[str]]]) -> Lines:
+    """Rows whose cells are parted already, each with its number in the file."""
     lines, numbers = [], []
     for number, row in rows:
         lines.append(_PART.join(" ".join(cell.split("\n")) for cell in row))

@@ -3,9 +3,10 @@ from their measured neighbours.
 
 Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `averaged_to_need`
 (long recordings), `overlap`, `without_copies`, `Overlap` (recordings that hold the same samples),
-`check_plausible`, `check_sense`, `implausible`, `without_dead_commands`, `without_impossible`,
-`without_rails`, `suspected_units` (what recordings cannot be), `uncommanded`, `unusable` (which
-cannot be used), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`, `thermometers_of`,
+`check_plausible`, `check_sense`, `turned_about`, `implausible`, `without_dead_commands`,
+`without_impossible`, `without_rails`, `suspected_units` (what recordings cannot be),
+`uncommanded`, `unusable` (which cannot be used), `prepare`, `Prepared`, `binned`,
+`noise_level`, `smoothed`, `thermometers_of`,
 `warm_chambers` (signals), `Block`, `Input`, `Residual`, `available_blocks`, `Unjudged`,
 `unjudged_blocks` (blocks that the channels do not tell), `signals_at_starts`, `change`,
 `predicted`, `residual` (blocks and their residuals), `with_unjudged_starts`, `notes_on_beginnings`,
@@ -45,6 +46,7 @@ from pamrs.diagnosis.prepare._plausibility import (
     check_plausible,
     check_sense,
     implausible,
+    turned_about,
     without_dead_commands,
     without_impossible,
 )
@@ -105,6 +107,7 @@ __all__ = [
     "smoothed",
     "suspected_units",
     "thermometers_of",
+    "turned_about",
     "unjudged_blocks",
     "uncommanded",
     "tanks_without_gauge",

@@ -499,8 +499,8 @@ def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iter
             yield (
                 f"{name} is outside {whose} for {100 * share:.0f} % of the time: from "
                 f"{_text(recording, name, values.min(), values.max())}, where "
-                f"{_text(recording, name, moving.low, moving.high)} are possible: right column, "
-                f"unit ({units}) and sign?"
+                f"{_text(recording, name, moving.low, moving.high)} are possible: right column"
+                f"{', no contraction' * (unit == 'm')}, unit ({units}) and sign?"
             )
         rows = recording.mask[name]
         steps = (
@@ -712,13 +712,13 @@ def _without(recording: Recording, channel: str) -> Recording:
 def check_sense(
     blocks: Sequence[Block], recordings: Sequence[Prepared], core: _core.Rig, case: str
 ) -> None:
-    """Refuse joint angles that are the model's own in another unit, or that go the opposite way
-    throughout.
+    """Refuse joint angles that are the model's own in another unit, and angles and lengths that go
+    the opposite way throughout.
 
     Parameters
     ----------
     blocks : sequence of Block
-        Those whose output is an angle are looked at.
+        Those whose output is an angle or a length are looked at.
     recordings : sequence of Prepared
         Recordings with drives.
     core : _core.Rig
@@ -731,8 +731,15 @@ def check_sense(
     DiagnosisError
         With every finding.
     """
+    _refuse(case, turned_about(blocks, recordings, core))
+
+
+def turned_about(
+    blocks: Sequence[Block], recordings: Sequence[Prepared], core: _core.Rig
+) -> list[str]:
+    """Findings of :func:`check_sense`, one for each recording, where most of them have one."""
     findings = []
-    for block in (b for b in blocks if channel_of(b.channel) == "joint_angle"):
+    for block in (b for b in blocks if channel_of(b.channel) in ("joint_angle", "length")):
         for prepared in recordings:
             try:
                 text = _sense(block, core, prepared)
@@ -741,13 +748,12 @@ def check_sense(
             if text:
                 findings.append(f"recording {prepared.recording.name!r}: {text}")
     # one recording may be odd; a heading is wrong in all of them
-    if findings and len(findings) * 2 > len(recordings):
-        _refuse(case, findings)
+    return findings if len(findings) * 2 > len(recordings) else []
 
 
 def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
-    """Finding on an angle that the model would have in another unit, with the other sign, or with
-    two pressures swapped; None where there is none.
+    """Finding on an angle or a length that the model would have in another unit, with the other
+    sign, or with two pressures swapped; None where there is none.
     """
     starts = prepared.starts(block.window, block.drives)
     rows = prepared.usable(block.channel, block.drives, starts)
@@ -765,28 +771,30 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
     span = _text(prepared.recording, name, measured.min(), measured.max())
     shown = f"{name} goes from {span}, not as the model says"
     turned = float(np.median(measured + model))
-    others: list[tuple[float, float, dict[str, tuple[Array, Array]], str]] = [
+    factors = [
         (
             _DEGREES,
             0.0,
-            {},
             f"{_DEGREES:.3g} times that would: are its values in rad under a heading in deg?",
         ),
         (
             1.0 / _DEGREES,
             0.0,
-            {},
             f"{1.0 / _DEGREES:.3g} times that would: are its values in deg under a heading in rad?",
         ),
         (
             -1.0,
             turned,
-            {},
-            (
-                "it moves opposite to the model throughout: is its sign that of the rig, or are "
-                "two muscles swapped?"
-            ),
+            "it moves opposite to the model throughout: is its sign that of the rig, or are two "
+            "muscles swapped?",
         ),
+    ]
+    if channel_of(name) == "length":
+        factors = [
+            (-1.0, turned, "it grows where the model's falls: does its sensor count the other way?")
+        ]
+    others: list[tuple[float, float, dict[str, tuple[Array, Array]], str]] = [
+        (factor, offset, {}, text) for factor, offset, text in factors
     ]
     for one, two in itertools.combinations([d for d in block.drives if d in signals], 2):
         text = f"with {one} and {two} in each other's place it would: are these columns swapped?"

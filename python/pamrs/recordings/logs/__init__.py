@@ -16,7 +16,8 @@ from pamrs._files import check_regular
 from pamrs.errors import MissingPackageError, PamrsError, RecordingError
 from pamrs.recordings._gate import check_size
 from pamrs.recordings.logs._hdf import read_hdf
-from pamrs.recordings.logs._log import Log, Series, TextFormat, table_of
+from pamrs.recordings.logs._json import read_json
+from pamrs.recordings.logs._log import Log, Series, TextFormat, switched, table_of
 from pamrs.recordings.logs._matlab import read_matlab
 from pamrs.recordings.logs._measurement import read_mdf, read_tdms
 from pamrs.recordings.logs._ros import read_bag, read_mcap
@@ -34,6 +35,7 @@ __all__ = [
     "check_readable",
     "read_log",
     "split_heading",
+    "switched",
     "table_of",
     "understood_unit",
 ]
@@ -47,6 +49,7 @@ class _Format(NamedTuple):
 
 
 _TEXT: Final = _Format(read_text_log)
+_JSON: Final = _Format(read_json)
 _ARROW: Final = _Format(read_arrow, ("pyarrow",))
 _HDF: Final = _Format(read_hdf, ("h5py",))
 _MDF: Final = _Format(read_mdf, ("asammdf",))
@@ -55,6 +58,7 @@ _BAG: Final = _Format(read_bag, ("rosbags",))
 #: function and its entry here.
 _FORMATS: Final[dict[str, _Format]] = {
     **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".lvm", ".asc", ""), _TEXT),
+    **dict.fromkeys((".json", ".jsonl", ".ndjson"), _JSON),
     **dict.fromkeys((".parquet", ".feather", ".arrow"), _ARROW),
     **dict.fromkeys((".npy", ".npz"), _Format(read_numpy)),
     ".mat": _Format(read_matlab, ("matio", "h5py")),
@@ -82,7 +86,7 @@ def _format(path: Path) -> _Format:
     if ending == ".dat" and path.is_file():
         with path.open("rb") as stream:  # measuring systems of cars call theirs so
             form = _MDF if stream.read(8) == b"MDF     " else form
-    if form is None or (name.endswith(".gz") and form is not _TEXT):
+    if form is None or (name.endswith(".gz") and form not in (_TEXT, _JSON)):
         raise RecordingError(
             f"{path}: the format {Path(name).suffix!r} is not read here; readable are "
             f"{', '.join(ENDINGS)} and the folder of a bag (text also .gz)"

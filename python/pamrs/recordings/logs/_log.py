@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +16,7 @@ from pamrs._files import MOST_SIZE
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import check_size
 from pamrs.recordings._stamps import TIME_UNITS
-from pamrs.recordings.table import Table
+from pamrs.recordings.table import NO_VALUE, Table, told_few
 from pamrs.units import parse_unit
 
 #: What a heading has behind its name: a unit in brackets (a number there tells two columns of one
@@ -150,6 +150,26 @@ def series_of_texts(name: str, texts: Sequence[str], unit: str = "") -> Series:
     return Series(name, np.array([place[text] for text in texts]), unit, None, labels)
 
 
+#: Pairs of words that a switch or a valve has, the first of them at rest.
+SWITCHES: Final = (
+    *(("off", "on"), ("false", "true"), ("closed", "open"), ("low", "high"), ("no", "yes")),
+    *(("aus", "ein"), ("aus", "an"), ("zu", "auf"), ("nein", "ja"), ("geschlossen", "offen")),
+)
+
+
+def switched(series: Series) -> Series:
+    """A series of the two words of a switch as 0 and 1, with ``off/on`` for its unit; others as
+    they are.
+    """
+    words = [label.lower() for label in series.labels]
+    for pair in SWITCHES:
+        if words and set(words) - NO_VALUE <= set(pair):
+            levels = np.array([pair.index(w) if w in pair else np.nan for w in words])
+            values = levels[series.values.astype(np.intp)]
+            return replace(series, values=values, unit="/".join(pair), labels=())
+    return series
+
+
 def table_of(log: Log) -> Table:
     """The series of a log that are as long as most, with their units in the headings.
 
@@ -176,10 +196,8 @@ def table_of(log: Log) -> Table:
     return Table(header, cells, [*log.remarks, *left])
 
 
-def _few(names: Any, most: int = 12) -> str:
-    known = [repr(name) for name in names]
-    more = f" and {len(known) - most} more" if len(known) > most else ""
-    return ", ".join(known[:most]) + more
+def _few(names: Iterable[str]) -> str:
+    return told_few(map(repr, names), most=12)
 
 
 def collected(

@@ -2,31 +2,44 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from pamrs.errors import RecordingError
-from pamrs.recordings._dates import is_moment, moments
-from pamrs.recordings.dialect import BESIDE_COMMAS, Dialect, dialect_of, is_number, is_useful
+from pamrs.recordings._dates import is_date, is_moment, moments
+from pamrs.recordings._stamps import CLOCK_WORDS
+from pamrs.recordings.dialect import (
+    BESIDE_COMMAS,
+    QUANTITY,
+    Dialect,
+    dialect_of,
+    is_number,
+    is_useful,
+)
 from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, series_of_texts
 from pamrs.recordings.logs._words import split_heading, understood_unit, unwrapped
 from pamrs.recordings.table import (
     NO_VALUE,
     Lines,
     Table,
+    joined_rows,
     lines_of,
     lines_of_rows,
+    numbers_of_cells,
     read_text,
     same_width,
     split_rows,
-    told_cells,
+    told_few,
     told_rows,
     usual_width,
 )
+from pamrs.units import parse_unit, same_dimension
 
 _COMMENTS: Final = ("#", "%", "//", "'")
 _UNNAMED: Final = "column "
@@ -37,17 +50,26 @@ _MOST_TEXTS: Final = 1000  # different texts of a column that can name pieces
 _MARKS: Final = {".": "points", ",": "commas"}
 _BESIDE_POINTS = re.compile(r"[-+]?(?:[1-9]\d{0,2}(?:,\d{3})+|\d{1,3})(?:\.\d+)?")
 _THOUSANDS = re.compile(r"[-+]?(\d{1,3}(\.\d{3})+|0)")
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]\d{2,3}(?!\d))")
+#: Keys above a table beside which the time between its samples stands.
+_SPACING: Final = re.compile(
+    r"(?:x[ _]?|horizontal |sampl\w+ |scan )?(?:interval|increment|period|resolution)|sample time|"
+    r"delta[ _][xt]|dt|abtast(?:zeit|intervall)",
+    re.IGNORECASE,
+)
+_VALUES: Final = frozenset(("value", "values", "wert", "reading", "valor", "valeur"))
 
 
 class _Headed(NamedTuple):
     """First row and width of a table, with the names and units from the rows above it."""
 
     first: int
-    width: int
+    kinds: list[str]  # of the cells of most rows, by column
     names: list[str]
     units: list[str]
     rows: list[list[str]]  # headings and units, as they stand in the file
     remarks: list[str]
+    spacing: float  # seconds between samples, as a row above says; NaN where none does
 
 
 def read_text_log(path: Path, form: TextFormat) -> Log:
@@ -71,14 +93,18 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
         If it cannot be read, or no table is found in it.
     """
     text, source = read_text(path), str(path)
-    lines = [line for line in text.splitlines() if line.strip()]
-    times: list[str] | None = None
     remarks: list[str] = []
+    lines = [line for line in text.splitlines() if line.strip()]
+    if any(map(_FORTRAN.search, lines[len(lines) // 2 :][:_LINES])):
+        text = _FORTRAN.sub("E", text)
+        lines = [line for line in text.splitlines() if line.strip()]
+        remarks.append("exponents are written with D, as Fortran does: read")
+    times: list[str] | None = None
     if form.delimiter is None:
-        apart = arrows_apart(lines)
+        apart = times_apart(lines, source)
         if apart is not None:
             lost = len(lines) - len(apart[0])
-            remarks = [f"lines without a time and an arrow: {lost}, left out"] if lost else []
+            remarks += [f"lines without a time: {lost}, left out"] if lost else []
             times, lines = apart
         labelled = labelled_rows(lines, times)
         if labelled is not None:
@@ -89,11 +115,11 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
     if times is not None:
         text = "\n".join(f"{a}{dialect.delimiter}{b}" for a, b in zip(times, lines, strict=True))
     if dialect.delimiter == " ":  # a unit belongs to the word before it
-        text = re.sub(r"[^\S\n]+\[", "[", text)
-        lines = [re.sub(r"\s+\[", "[", line) for line in lines]
-    comment = _last_comment(lines, dialect)
+        text = re.sub(r"[^\S\n]+(?=[\[(][^\s\])]*[\])])", "", text)
+        lines = text.splitlines()
+    comments = _comments(lines, dialect)
     body = lines_of(text, dialect.delimiter, source, _COMMENTS)
-    return log_of_lines(path, body, form, dialect.decimal, remarks, comment)
+    return log_of_lines(path, body, form, dialect.decimal, remarks, comments)
 
 
 def log_of_lines(
@@ -102,7 +128,7 @@ def log_of_lines(
     form: TextFormat,
     decimal: str,
     remarks: Sequence[str] = (),
-    comment: list[str] | None = None,
+    comments: Sequence[list[str]] = (),
 ) -> Log:
     """The log of a table, with what stands above it.
 
@@ -118,8 +144,8 @@ def log_of_lines(
         Decimal mark.
     remarks : sequence of str
         What was said of it before.
-    comment : list of str, optional
-        Headings that stand in a comment.
+    comments : sequence of list of str
+        Cells of the comments above it, which may be headings.
 
     Returns
     -------
@@ -130,40 +156,42 @@ def log_of_lines(
     RecordingError
         If it is no table of numbers.
     """
-    middle = len(body.lines) // 2
-    sample = body.rows(middle, middle + _LINES)
-    above = _headed(path, body.rows(0, _HEAD), sample, decimal, form, comment)
+    above = _headed(path, body, decimal, form, comments)
     rows = body.after(above.first)
     if len(rows.lines) < 2:
         raise RecordingError(
             f"{path}: no table was found: it has {len(rows.lines)} rows of numbers"
         )
-    rows, part, said = same_width(rows, above.width, above.rows, str(path), strict=False)
-    table = Table(above.names, rows)
-    said = [*remarks, *above.remarks, *said]
+    stamped = "moment" in above.kinds  # then each row has a time of day, and is not asked
+    parted = ((k, rows.parted(line)) for k, line in enumerate(rows.lines) if ":" in line)
+    odd = (
+        {} if stamped else {k: rows.numbers[k] for k, row in parted if _is_dated(row, above.kinds)}
+    )
+    left = told_rows([*odd.values()], "rows with a time of day for a number")
+    rows = rows.only([k for k in range(len(rows.lines)) if k not in odd])
+    width = len(above.kinds)
+    rows, part, said = same_width(rows, width, above.rows, str(path), strict=False)
+    said = [*remarks, *above.remarks, *left, *said]
+    rows, names, units = _dated(rows, above.names, above.units, said)
+    table = Table(names, rows)
     found: list[Series] = []
     unread: dict[str, str] = {}
-    for place, unit in enumerate(above.units):
+    for place, unit in enumerate(units):
         _column(table, place, unit, decimal, form.thousands, found, unread, said)
+    found = _pivoted(_spaced(found, above.spacing, said), said)
     if part:
         found.append(Series("part", 1.0 + np.array(part) - part[0]))
     return collected(path, found, unread, said)
 
 
 def _headed(
-    path: Path,
-    head: list[list[str]],
-    middle: list[list[str]],
-    decimal: str,
-    form: TextFormat,
-    comment: list[str] | None,
+    path: Path, body: Lines, decimal: str, form: TextFormat, comments: Sequence[list[str]]
 ) -> _Headed:
     """Read names and units of the columns from the rows above the numbers of a table."""
-    first, width = _first_row(head, middle, decimal, form)
-    if comment is not None and not (len(comment) == width and width > 1):
-        comment = None
-    above = head[:first]
-    names, units, used = _headings(above, width, form, comment)
+    head, middle = body.rows(0, _HEAD), len(body.lines) // 2
+    first, kinds = _first_row(head, body.rows(middle, middle + _LINES), decimal, form)
+    width = len(kinds)
+    names, units, used = _headings(head[:first], width, decimal, form, comments)
     remarks = []
     if form.columns is not None:
         if len(form.columns) != width:
@@ -171,28 +199,58 @@ def _headed(
                 f"{path}: columns lists {len(form.columns)} names, but there are {width} columns"
             )
         names, units = _named(list(form.columns))
-    over = len(above) - len(used)
-    if over > 0 and any(used):
-        remarks.append(f"lines above the headings: {over}, not read")
-    return _Headed(first, width, names, units, used, remarks)
+    if used and used[0] in head:
+        at = head.index(used[0])
+        line = f"the headings are line {body.numbers[at]}"
+        remarks += [f"lines above the headings: {at}, not read; {line}"] if at else []
+        between = [body.numbers[k] for k in range(at, first) if head[k] not in used]
+        remarks += told_rows(between, "lines between the headings and the numbers")
+    elif not used and form.header is not False and form.columns is None:
+        some = f"columns 1 to {width} have no names" if width > 1 else "its column has no name"
+        number = body.numbers[min(first, len(body.lines) - 1)]
+        remarks.append(f"there are no headings above line {number}: {some}")
+    spacing = _stated_spacing(head[: first + _BEGUN], decimal)
+    return _Headed(first, kinds, names, units, used, remarks, spacing)
 
 
 def _first_row(
     head: list[list[str]], middle: list[list[str]], decimal: str, form: TextFormat
-) -> tuple[int, int]:
-    """Index of the first row of numbers, and how many columns there are."""
+) -> tuple[int, list[str]]:
+    """Index of the first row of numbers, and the kind of the cells of each column."""
     width = usual_width([len(row) for row in middle])
+
+    def kind(cell: str) -> str:
+        if is_number(cell, decimal, form.thousands):
+            return "number"
+        return ("moment" if is_moment(cell) else "quantity") if useful([cell]) else ""
 
     def useful(row: list[str]) -> int:
         return sum(is_useful(cell, decimal, form.thousands) for cell in row)
 
-    typical = sorted(map(useful, middle))[len(middle) // 2] if middle else 0
+    usual = [
+        max(kinds := [kind(row[k]) for row in middle if len(row) == width], key=kinds.count)
+        for k in range(width)
+    ]
+
+    def alike(row: list[str]) -> int:
+        same = sum(k == kind(cell) != "" for k, cell in zip(usual, row, strict=False))
+        return 0 if _is_dated(row, usual) else same
+
+    # a row of which only half is alike may be one of keys and what they say
+    least = sorted(map(alike, middle))[len(middle) // 2] // 2 if middle else 0
     for index, row in enumerate(head):
-        if width / 2 < len(row) <= width and useful(row) >= max(1, (typical + 1) // 2):
+        if width / 2 < len(row) <= width and alike(row) > least:
             if form.header is None:
                 index += _begun_before(head[index : index + _BEGUN], width, useful)
-            return (max(index, 1) if form.header else index), width
-    return 0, width
+            return (max(index, 1) if form.header else index), usual
+    return 0, usual
+
+
+def _is_dated(row: list[str], kinds: list[str]) -> bool:
+    """True where a time of day stands in a column of numbers: the row is none of the table."""
+    pairs = zip(row, kinds, strict=False)
+    times = [cell for cell, kind in pairs if kind == "number" and ":" in cell]
+    return any(is_moment(cell.strip()) for cell in times)
 
 
 def _begun_before(rows: list[list[str]], width: int, useful: Callable[[list[str]], int]) -> int:
@@ -206,40 +264,148 @@ def _begun_before(rows: list[list[str]], width: int, useful: Callable[[list[str]
     return last
 
 
-def _last_comment(lines: list[str], dialect: Dialect) -> list[str] | None:
-    """The last comment above the numbers: it may hold the headings, ``# t; p1``."""
-    for line in reversed(lines[:200]):
-        if line.lstrip().startswith(_COMMENTS):
-            rows = split_rows(line.lstrip().lstrip("#%/'"), dialect.delimiter)
-            cells = [cell.strip() for cell in rows[0]] if rows else []
-            if not any(is_number(cell, dialect.decimal, None) for cell in cells):
-                return cells
-    return None
+def _comments(lines: list[str], dialect: Dialect) -> list[list[str]]:
+    """Cells of the comments above the numbers: they may hold the headings, ``# t; p1``."""
+    found = []
+    for line in lines[:200]:
+        comment = line.lstrip().startswith(_COMMENTS)
+        rows = split_rows(line.lstrip().lstrip("#%/'") if comment else line, dialect.delimiter)
+        cells = [cell.strip() for cell in rows[0]] if rows else []
+        if comment:
+            found.append(cells)
+        elif cells and all(is_useful(cell, dialect.decimal, None) for cell in cells):
+            break
+    return found
 
 
 def _headings(
-    above: list[list[str]], width: int, form: TextFormat, comment: list[str] | None
+    above: list[list[str]],
+    width: int,
+    decimal: str,
+    form: TextFormat,
+    comments: Sequence[list[str]],
 ) -> tuple[list[str], list[str], list[list[str]]]:
     """Names and units from the rows above the numbers, and those rows."""
-    full = [row for row in above if len(row) in (width, width + 1) or 2 * len(row) > width > 2]
-    if form.header is False or not (full or comment):
+
+    def count(row: list[str]) -> int:
+        cells = {cell for cell in row if any(map(str.isalpha, cell))}
+        return sum(not is_useful(cell, decimal, form.thousands) for cell in cells)
+
+    full = [row for row in above if width < 2 * len(row) and not any(row[width + 1 :])]
+    if not any(map(count, full)) and not form.header:
+        full = [row for row in comments if len(row) == width > 1]
+    if form.header is False or not full or not (any(map(count, full)) or form.header):
         return [f"{_UNNAMED}{i + 1}" for i in range(width)], [""] * width, []
-    full = full or [comment or []]
-    used = full[-1:]
-    last = [unwrapped(cell) for cell in full[-1]]
-    units = [""] * width
-    if len(full) > 1 and _all_units(last):
-        units = ([*last, *[""] * width])[:width]
-        used = full[-2:]
-    headings = ["time" if is_moment(cell) else cell for cell in used[0]]
-    named, inside = _named(([*headings, *[""] * width])[:width])
-    return named, [a if a and a != "-" else b for a, b in zip(units, inside, strict=True)], used
+    below = [row for row in full[1:] if _all_units([unwrapped(cell) for cell in row])][-1:]
+    names = max(reversed([row for row in full if row not in below]), key=count)
+    units = ([*(unwrapped(cell) for row in below for cell in row), *[""] * width])[:width]
+    headings = ["time" if is_moment(cell) else cell for cell in ([*names, *[""] * width])[:width]]
+    label = [  # of its row, not of a column
+        name.endswith(("=", ":"))
+        or (min(headings.count(name), units.count(unit)) > 1 and not understood_unit(unit or "s"))
+        for name, unit in zip(headings, units, strict=True)
+    ]
+    headings = ["" if off else name for name, off in zip(headings, label, strict=True)]
+    units = [
+        "" if off or is_number(unit, decimal, None) else unit
+        for unit, off in zip(units, label, strict=True)
+    ]
+    named, inside = _named(headings)
+    merged = [a if a and a != "-" else b for a, b in zip(units, inside, strict=True)]
+    return named, merged, [names, *below]
+
+
+def _stated_spacing(rows: list[list[str]], decimal: str) -> float:
+    """Seconds between samples that stand beside or below a key above a table; NaN for none."""
+    beside = (pair for row in rows for pair in zip(row, row[1:], strict=False))
+    below = (pair for two in zip(rows, rows[1:], strict=False) for pair in zip(*two, strict=False))
+    for key, value in (*beside, *below):
+        match = QUANTITY.fullmatch(value)
+        if match and _SPACING.fullmatch(key.strip(" =:")):
+            unit = understood_unit(match["unit"] or "s")
+            if unit is not None and same_dimension(unit.unit, "s"):
+                number = float(match["number"].replace(decimal, "."))
+                return number * parse_unit(unit.unit).scale
+    return math.nan
+
+
+def _spaced(found: list[Series], spacing: float, remarks: list[str]) -> list[Series]:
+    """Series with times where a column without a name rises by the spacing that stands above the
+    table, or one counts the samples and nothing else is a clock.
+    """
+    words = {word for item in found for word in re.findall("[a-z]+", item.name.lower())}
+    clocked = any(item.stamps for item in found) or bool(words & CLOCK_WORDS)
+    made: list[Series] = []
+    times: list[Series] = []
+    for item in found if math.isfinite(spacing) and spacing > 0.0 else ():
+        steps = np.diff(item.values)
+        named = not item.name.startswith(_UNNAMED)
+        if not named and np.allclose(steps, spacing, atol=0.5 * spacing, rtol=0.0):
+            remarks.append(
+                f"{item.name} rises by {spacing:g} s, as a line above it says: the times"
+            )
+            item = Series("time", item.values, "s")
+            times.append(item)
+            if len(times) > 1 and np.array_equal(times[0].values, item.values):
+                continue
+        elif not clocked and len(steps) and np.all(steps == 1.0):
+            remarks.append(
+                f"{item.name} counts samples, {spacing:g} s apart as a line above them says"
+            )
+            item = Series(item.name if named else "time", item.values * spacing, "s")
+        made.append(item)
+    return made or found
+
+
+def _pivoted(found: list[Series], remarks: list[str]) -> list[Series]:
+    """Series of a table with a row for each reading: when, of what, how much."""
+    values = [item for item in found if item.name.strip("_ ").lower() in _VALUES]
+    texts = [item for item in found if len(item.labels) > 1]
+    said = [item for item in texts if _all_units([*map(unwrapped, item.labels)])]
+    names = [item for item in texts if item not in said]
+    if len(values) != 1 or len(names) != 1 or values[0].labels:
+        return found
+    (value,), (name,) = values, names
+    made = []
+    for place, label in enumerate(name.labels):
+        rows = name.values == place
+        called, unit = split_heading(label)
+        units = {each.labels[int(k)] for each in said[:1] for k in each.values[rows]}
+        unit = " or ".join(sorted(units)) or unit or value.unit
+        made.append(Series(called, np.where(rows, value.values, np.nan), unit))
+    remarks.append(f"{name.name} says of what {value.name} is in each row: {told_few(name.labels)}")
+    return [*(item for item in found if item not in (value, name, *said)), *made]
+
+
+def _dated(
+    rows: Lines, names: list[str], units: list[str], remarks: list[str]
+) -> tuple[Lines, list[str], list[str]]:
+    """Rows, names and units with a date and the time of day beside it in one cell."""
+    middle = len(rows.lines) // 2
+    some = rows.rows(middle, middle + 1)
+    dates = [k for row in some for k, cell in enumerate(row) if is_date(cell)]
+    times = [k for row in some for k, cell in enumerate(row) if is_moment(cell)]
+    if not dates or not times or is_date(some[0][times[0]].split()[0]):
+        return rows, names, units
+    date, time, last = dates[0], times[0], ""
+    joined = []
+    for row in rows.rows():
+        last = row[date] or last  # some write it only where it changes
+        row[time] = f"{last} {row[time]}"
+        joined.append([cell for k, cell in enumerate(row) if k != date])
+    remarks.append(f"{names[date]} and {names[time]} are one clock, here {names[time]}")
+    kept = [k for k in range(len(names)) if k != date]
+    made = joined_rows(zip(rows.numbers, joined, strict=True))
+    return made, [names[k] for k in kept], [units[k] for k in kept]
 
 
 def _all_units(cells: list[str]) -> bool:
     """True where more than half of the cells of a row that have a text are known units."""
     said = [cell for cell in cells if cell not in ("", "-", "1", "%")]
-    return 2 * sum(understood_unit(cell) is not None for cell in said) > len(said)
+    return any(
+        2 * sum(understood_unit(cell) is not None for cell in some) > len(some)
+        for some in (said, set(said))  # a label may stand beside each of them
+    )
 
 
 def _named(headings: list[str]) -> tuple[list[str], list[str]]:
@@ -264,7 +430,7 @@ def _column(
     if 2 * len(strange) < np.isfinite(values).sum() and not table.doubtful(place, decimal):
         odd = [table.cell(place, row) for row in strange]
         if not any("," in cell or "." in cell for cell in odd):
-            remarks += [f"{name}: {told_cells(odd)}"] if odd else []
+            remarks += [f"{name}: {text}" for text in table.told(place, strange)]
             found.append(Series(name, values, unit))
             return
     cells = [str(cell) for cell in table.cells(place)]
@@ -277,21 +443,44 @@ def _column(
         values, strange = table.read(place, mark, decimal)
     filled = sum(map(bool, cells))
     if 2 * len(strange) < filled:
-        if strange:
-            remarks.append(f"{name}: {told_cells([cells[row] for row in strange])}")
+        remarks += [f"{name}: {text}" for text in table.told(place, strange)]
         found.append(Series(name, values, unit))
         return
+    try:
+        made, lost, said = _of_texts(Series(name, values, unit), cells, table, decimal, thousands)
+    except RecordingError as error:
+        unread[name] = str(error)
+        return
+    found.append(made)
+    remarks += [f"{name}: {text}" for text in (*table.told(place, lost), *said)]
+
+
+def _of_texts(
+    series: Series, cells: list[str], table: Table, decimal: str, thousands: str | None
+) -> tuple[Series, list[int], list[str]]:
+    """A column of dates, of numbers with their units or of texts, rows of cells that are none, and
+    remarks; an error if there are too many texts or units.
+    """
     stamps = moments(cells)
     if stamps is not None:
-        lost = [cell for cell, value in zip(cells, stamps[0], strict=True) if np.isnan(value)]
-        remarks += [f"{name}: {told_cells(lost)}"] if lost else []
-        remarks += [f"{name}: {stamps[1]}"] if stamps[1] else []
-        found.append(Series(name, stamps[0], "s", stamps=True))
-        return
+        lost = np.flatnonzero(np.isnan(stamps[0])).tolist()
+        made = Series(series.name, stamps[0], "s", stamps=True)
+        return made, lost, [stamps[1]] if stamps[1] else []
+    matches = [QUANTITY.fullmatch(cell) for cell in cells]
+    units = {match["unit"]: row for row, match in enumerate(matches) if match and match["unit"]}
+    if units and 2 * sum(match is not None for match in matches) > sum(map(bool, cells)):
+        if len(units) > 1:
+            some = (f"{cells[row]!r} in row {table.row_numbers[row]}" for row in units.values())
+            raise RecordingError(f"its cells have several units: {told_few(some)}")
+        values, _ = numbers_of_cells(
+            [m["number"] if m else "" for m in matches], thousands, decimal
+        )
+        empty = {row for row, cell in enumerate(cells) if cell.lower() in NO_VALUE}
+        lost = [row for row, match in enumerate(matches) if not match and row not in empty]
+        return replace(series, values=values, unit=series.unit or units.popitem()[0]), lost, []
     if (count := len(set(cells))) > _MOST_TEXTS:
-        unread[name] = f"it has {count} different texts"
-        return
-    found.append(series_of_texts(name, cells))
+        raise RecordingError(f"it has {count} different texts")
+    return series_of_texts(series.name, cells), [], []
 
 
 def _grouped(cells: Sequence[str], decimal: str) -> str:
@@ -315,7 +504,12 @@ def _example(cells: Sequence[str], mark: str) -> str:
     return next(cell for cell in cells if mark in cell)
 
 
-_ARROW: Final = re.compile(r"\s*(\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?)\s*->\s?(.*)")
+#: Lines with a time beside the rest: ``10:16:51.123 -> 5.00,152057`` of a serial monitor, and
+#: ``rig,bench=1 u=5.0,p=1.2 1669112211000000000`` of InfluxDB.
+_APART: Final = (
+    re.compile(r"\s*(?P<of>)(?P<time>\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?)\s*->\s?(?P<rest>.*)"),
+    re.compile(r"(?P<of>[^\s,]+(?:,[^\s,=]+=[^\s,]+)*) (?P<rest>[^\s=]+=\S+) (?P<time>\d{10,19})"),
+)
 _NUMBER: Final = r"[-+]?(?:\d+(?:[.,]\d+)?|\.\d+)(?:[eE][-+]?\d+)?|nan|ovf|inf|OL|#N/A"
 _PAIR: Final = re.compile(
     r"[\s,;|{\"]*(?P<name>[^\W\d](?:[^\s:=,;|{}\"]|[ ](?=\S))*)\"?"
@@ -326,24 +520,40 @@ _PAIR: Final = re.compile(
 _MOST: Final = 0.8  # of the lines look so
 
 
-def arrows_apart(lines: Sequence[str]) -> tuple[list[str], list[str]] | None:
-    """Split lines like ``10:16:51.123 -> 5.00,152057`` at the arrow.
+def times_apart(lines: Sequence[str], source: str) -> tuple[list[str], list[str]] | None:
+    """Split lines like ``10:16:51.123 -> 5.00,152057`` into the time and the rest.
 
     Parameters
     ----------
     lines : sequence of str
         All lines.
+    source : str
+        The file, for messages.
 
     Returns
     -------
     times, rests : list of str
-        Of the lines that have an arrow; None where most have none.
+        Of the lines that have a time; None where most have none.
+
+    Raises
+    ------
+    RecordingError
+        If lines are of several measurements, whose fields would be taken for one.
     """
     middle = lines[len(lines) // 2 :][:100]
-    if sum(_ARROW.fullmatch(line) is not None for line in middle) < _MOST * max(len(middle), 1):
-        return None
-    found = [match for line in lines if (match := _ARROW.fullmatch(line)) is not None]
-    return [match[1] for match in found], [match[2] for match in found]
+    for form in _APART:
+        if sum(form.fullmatch(line) is not None for line in middle) < _MOST * max(len(middle), 1):
+            continue
+        found = [match for line in lines if (match := form.fullmatch(line)) is not None]
+        other = next((match for match in found if match["of"] != found[0]["of"]), None)
+        if other is not None:
+            raise RecordingError(
+                f"{source}: line {lines.index(other[0]) + 1} is of {other['of']!r}, those before "
+                f"it are of {found[0]['of']!r}: write one measurement to a file"
+            )
+        rests = [re.sub(r"(?<=\d)[iu](?=,|$)", "", match["rest"]) for match in found]
+        return [match["time"] for match in found], rests
+    return None
 
 
 def _pairs(line: str) -> list[tuple[str, str, str]] | None:

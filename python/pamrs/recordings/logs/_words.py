@@ -17,6 +17,9 @@ _INSIDE = re.compile(
     r"^\s*[^\[\](){}<>]+?[\s_]*(?P<unit>\[[^\[\]]+\]|\([^()]+\)|\{[^{}]+\}|<[^<>]+>)"
     r"[\s_-]*(?P<rest>\(?[^\[\](){}<>]+\)?)\s*$"
 )
+_COMMA = re.compile(
+    r"^\s*(?P<name>[^,]+),\s*(?P<unit>[^,()]+?)\s*(?:\([^()]*\))?\s*$"
+)  # as HOBO has it
 _SLASH = re.compile(r"^\s*(?P<name>.+?)\s+(?:/|in)\s*(?P<unit>[^\s/]+)\s*$")
 _DIVIDED = re.compile(r"^\s*(?P<name>[^/]+)/(?P<unit>[^/\s]+)\s*$")  # as DIN has it, U/V
 _TAIL = re.compile(
@@ -47,6 +50,8 @@ _TAILS: Final = frozenset(
 #: Of them, those of three letters or more are taken in capitals, too; ATM is the air outdoors.
 _CAPITALS: Final = frozenset(unit.upper() for unit in _TAILS if len(unit) > 2) - {"ATM"}
 _WORDS: Final[dict[str, str]] = {
+    "segundos": "s", "secondes": "s", "milisegundos": "ms", "millisecondes": "ms",
+    "millisekunden": "ms", "microsegundos": "us", "grados": "deg", "degrés": "deg",
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sekunden": "s",
     "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us", "µs": "us",
     "microsecond": "us", "microseconds": "us", "nanosecond": "ns", "nanoseconds": "ns",
@@ -190,9 +195,10 @@ def split_heading(heading: str) -> tuple[str, str]:
         unit = match["square"] if match["square"] is not None else match["other"][1:-1]
         if match["square"] is not None or understood_unit(unit) or _like_a_unit(unit):
             return match["name"], unit.strip()
-    match = _SLASH.match(heading)
-    if match and understood_unit(match["unit"]):
-        return match["name"], match["unit"]
+    for form in (_COMMA, _SLASH):
+        match = form.match(heading)
+        if match and understood_unit(match["unit"]):
+            return match["name"], match["unit"]
     match = _DIVIDED.match(heading)
     if match and measured_from(match["unit"])[0] in _TAILS | {"m", "A", "°"}:
         return match["name"], match["unit"]
@@ -225,7 +231,7 @@ def _like_a_unit(text: str) -> bool:
     plain = text.strip().lower()
     return (
         plain in _COUNTS
-        or "/" in plain
+        or ("/" in plain and ":" not in plain)
         or any(plain.startswith(unit.lower()) for unit in _PRESSURES if len(unit) > 2)
         or any(map(_like_a_tail, re.split(r"[^A-Za-z]+", text)))
     )
