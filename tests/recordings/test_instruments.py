@@ -210,7 +210,9 @@ DIALECTS = {
 def asked(path: Path, rig: pamrs.Rig = SHOULDER) -> tuple[LogProposal, str]:
     """The proposal for a log, and all that is told."""
     (item,) = propose([path], rig).logs
-    return item, "\n".join([*item.log.remarks, *item.remarks, *questions(item, rig)])
+    return item, "\n".join(
+        [*item.log.remarks, *item.remarks, *questions(item, rig, DiagnosisSettings())]
+    )
 
 
 @pytest.mark.parametrize("name", DIALECTS)

@@ -64,6 +64,7 @@ def import_command(
     if file is not None:
         check_new(file)
     from pamrs.diagnosis.ready import questions
+    from pamrs.diagnosis.settings import DiagnosisSettings
     from pamrs.recordings import propose
     from pamrs.recordings.logs import TextFormat, check_readable
 
@@ -79,7 +80,7 @@ def import_command(
         proposal = propose(log, model, sample_time=step, form=form)
         if model is not None:
             for item in proposal.logs:
-                item.remarks.extend(questions(item, model))
+                item.remarks.extend(questions(item, model, DiagnosisSettings()))
     for item in proposal.logs:
         _show(item)
     folder = out or Path()

@@ -127,7 +127,7 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
     return Ready(case, blocks, suspected, doubts, [*copies, *notes], masked, [*dead, *clipped])
 
 
-def questions(proposed: LogProposal, rig: Rig) -> list[str]:
+def questions(proposed: LogProposal, rig: Rig, settings: DiagnosisSettings) -> list[str]:
     """Questions about a proposed log that a diagnosis would refuse, before it becomes a case.
 
     Parameters
@@ -136,13 +136,15 @@ def questions(proposed: LogProposal, rig: Rig) -> list[str]:
         Of one log.
     rig : Rig
         The nominal model.
+    settings : DiagnosisSettings
+        Limits of what a recording can be.
 
     Returns
     -------
     list of str
         Why :func:`readied` would refuse it; empty for a sound log, or one without a clock.
     """
-    settings, found = DiagnosisSettings(), list[str]()
+    found = list[str]()
     try:
         recordings = proposed.recordings(ambient_of(rig))
     except RecordingError as error:

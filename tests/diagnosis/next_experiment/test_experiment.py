@@ -90,7 +90,8 @@ def test_the_report_draws_them_and_json_does_not_hold_them(speeds) -> None:
     assert "experiments compared" in page
     assert "the other way round" in page
     written = kept(found)
-    keys = {"text", "instruction", "excitation", "expected_information_bits", "pairs"}
+    keys = {"text", "instruction", "excitation", "protocol", "pairs"}
+    keys.add("expected_information_bits")
     assert set(written["next_experiment"]) == keys
 
 

@@ -21,7 +21,7 @@ from pamrs.recordings import Recording
 
 
 def foretold(
-    hypotheses: Sequence[Modelled], recording: Recording, settings: DiagnosisSettings | None = None
+    hypotheses: Sequence[Modelled], recording: Recording, settings: DiagnosisSettings
 ) -> dict[str, dict[str, float]]:
     """Residuals of each hypothesis in a recording that it was not fitted to, its parameters moved
     no farther than what was known of them before.
@@ -32,8 +32,8 @@ def foretold(
         Rigs as fitted, with their effects.
     recording : Recording
         Of the same rig; parameters that had another value in it have that.
-    settings : DiagnosisSettings, optional
-        How it is made ready; the published ones by default.
+    settings : DiagnosisSettings
+        Settings that it is made ready with.
 
     Returns
     -------
@@ -48,12 +48,11 @@ def foretold(
     SimulationError
         If a model leaves the range in which it holds.
     """
-    chosen = DiagnosisSettings() if settings is None else settings
     found = {}
     for label, rig, _ in hypotheses:
         own = tuple(name for name in measurable(rig) if name in recording.channels)
-        prepared = prepare(recording, rig, chosen)
-        problem = problem_of(rig, [prepared], own, chosen)
+        prepared = prepare(recording, rig, settings)
+        problem = problem_of(rig, [prepared], own, settings)
         weights = weights_of(problem, rig)
         left = misfit(problem, linear(problem, rig), weights)
         # in bins as short as those of the fit a sensor's own noise is larger than in its level
