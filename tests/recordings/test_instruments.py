@@ -237,8 +237,19 @@ def test_a_dialect_is_read_right_or_told(tmp_path: Path, name: str) -> None:
         assert np.mean(away > 2e-3 * np.ptp(VALUES[channel])) <= 0.05 * (channel == "valve_command")
 
 
-def test_every_dialect_is_there() -> None:
-    assert len(DIALECTS) >= 30
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("Interval;0,01 s\nn;p", "{0};{0}"),
+        ("Interval;1.000,0 us\nn;p", "{0};{0},5"),
+    ],
+)
+def test_what_is_no_spacing_is_not_taken_for_one(tmp_path: Path, head: str, row: str) -> None:
+    rows = [row.format(i) for i in range(60)]
+    (tmp_path / "log.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+    log = read_log(tmp_path / "log.csv")
+    np.testing.assert_array_equal(log.series["n"].values, np.arange(60))
+    assert "p" in log.series
 
 
 def test_runs_below_a_line_with_the_date_are_recordings(tmp_path: Path) -> None:

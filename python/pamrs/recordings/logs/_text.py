@@ -324,8 +324,8 @@ def _stated_spacing(rows: list[list[str]], decimal: str) -> float:
         if match and _SPACING.fullmatch(key.strip(" =:")):
             unit = understood_unit(match["unit"] or "s")
             if unit is not None and same_dimension(unit.unit, "s"):
-                number = float(match["number"].replace(decimal, "."))
-                return number * parse_unit(unit.unit).scale
+                (number,), _ = numbers_of_cells([match["number"]], None, decimal)
+                return float(number) * parse_unit(unit.unit).scale
     return math.nan
 
 
