@@ -209,7 +209,8 @@ def _headed(
         some = f"columns 1 to {width} have no names" if width > 1 else "its column has no name"
         number = body.numbers[min(first, len(body.lines) - 1)]
         remarks.append(f"there are no headings above line {number}: {some}")
-    spacing = _stated_spacing(head[: first + _BEGUN], decimal)
+    begun = [] if used else head[first : first + _BEGUN]  # headings would say what is in them
+    spacing = _stated_spacing(head[:first], begun, decimal)
     return _Headed(first, kinds, names, units, used, remarks, spacing)
 
 
@@ -315,10 +316,14 @@ def _headings(
     return named, merged, [names, *below]
 
 
-def _stated_spacing(rows: list[list[str]], decimal: str) -> float:
-    """Seconds between samples that stand beside or below a key above a table; NaN for none."""
-    beside = (pair for row in rows for pair in zip(row, row[1:], strict=False))
-    below = (pair for two in zip(rows, rows[1:], strict=False) for pair in zip(*two, strict=False))
+def _stated_spacing(above: list[list[str]], begun: list[list[str]], decimal: str) -> float:
+    """Seconds between samples that stand beside a key above a table or in its first rows, or below
+    one above it in a row that is none of numbers; NaN for none.
+    """
+    beside = (pair for row in above + begun for pair in zip(row, row[1:], strict=False))
+    rows = zip(above, above[1:], strict=False)
+    said = (two for two in rows if not all(is_useful(c, decimal, None) for c in two[1] if c))
+    below = (pair for two in said for pair in zip(*two, strict=False))
     for key, value in (*beside, *below):
         match = QUANTITY.fullmatch(value)
         if match and _SPACING.fullmatch(key.strip(" =:")):
