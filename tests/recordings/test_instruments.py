@@ -268,6 +268,25 @@ def test_runs_below_a_line_with_the_date_are_recordings(tmp_path: Path) -> None:
     assert [len(each) for each in found] == [40, 40, 40]
 
 
+@pytest.mark.parametrize(
+    ("form", "cells", "told"),
+    [
+        ("{:,.1f} mbar", {}, "p: commas part thousands, as in '1,000.5 mbar'"),
+        ("{:.1f} mbar", {7: "OL mbar", 9: "1.2.3 mbar", 11: "-"}, "p: 2 cells are no numbers"),
+    ],
+)
+def test_numbers_with_units_are_read_or_told(
+    tmp_path: Path, form: str, cells: dict[int, str], told: str
+) -> None:
+    values = 970.5 + np.arange(60.0)
+    rows = [f"{i};{cells.get(i, form.format(value))}" for i, value in enumerate(values)]
+    (tmp_path / "log.txt").write_text("\n".join(["t [s];p", *rows]), encoding="utf-8")
+    log = read_log(tmp_path / "log.txt")
+    values[list(cells)] = np.nan
+    np.testing.assert_array_equal(log.series["p"].values, values)
+    assert [remark[: len(told)] for remark in log.remarks] == [told]
+
+
 def test_a_pause_between_dates_lasts_as_long_as_they_say(tmp_path: Path) -> None:
     rows = [
         f"2026-04-1{4 + d},{h:02d}:{m:02d},1.{m:02d}"

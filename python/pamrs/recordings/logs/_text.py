@@ -444,7 +444,7 @@ def _column(
             unread[name] = "it is empty"
         return
     if thousands is None and (mark := _grouped(cells, decimal)):
-        remarks.append(f"{name}: {_MARKS[mark]} part thousands, as in {_example(cells, mark)!r}")
+        remarks += [f"{name}: {text}" for text in _told_mark(cells, mark)]
         values, strange = table.read(place, mark, decimal)
     filled = sum(map(bool, cells))
     if 2 * len(strange) < filled:
@@ -477,12 +477,13 @@ def _of_texts(
         if len(units) > 1:
             some = (f"{cells[row]!r} in row {table.row_numbers[row]}" for row in units.values())
             raise RecordingError(f"its cells have several units: {told_few(some)}")
-        values, _ = numbers_of_cells(
-            [m["number"] if m else "" for m in matches], thousands, decimal
-        )
-        empty = {row for row, cell in enumerate(cells) if cell.lower() in NO_VALUE}
-        lost = [row for row, match in enumerate(matches) if not match and row not in empty]
-        return replace(series, values=values, unit=series.unit or units.popitem()[0]), lost, []
+        numbers = [
+            match["number"] if match else cell for match, cell in zip(matches, cells, strict=True)
+        ]
+        mark = thousands or _grouped(numbers, decimal)
+        values, lost = numbers_of_cells(numbers, mark, decimal)
+        made = replace(series, values=values, unit=series.unit or units.popitem()[0])
+        return made, lost, _told_mark(cells, mark) if thousands is None else []
     if (count := len(set(cells))) > _MOST_TEXTS:
         raise RecordingError(f"it has {count} different texts")
     return series_of_texts(series.name, cells), [], []
@@ -505,8 +506,10 @@ def _grouped(cells: Sequence[str], decimal: str) -> str:
     return "." if twice and all(map(_THOUSANDS.fullmatch, told)) else ""
 
 
-def _example(cells: Sequence[str], mark: str) -> str:
-    return next(cell for cell in cells if mark in cell)
+def _told_mark(cells: Sequence[str], mark: str) -> list[str]:
+    """Remark on a mark that parts thousands, in a list; empty where none does."""
+    some = [cell for cell in cells if mark and mark in cell]
+    return [f"{_MARKS[mark]} part thousands, as in {cell!r}" for cell in some[:1]]
 
 
 #: Lines with a time beside the rest: ``10:16:51.123 -> 5.00,152057`` of a serial monitor, and
