@@ -280,7 +280,7 @@ def test_numbers_with_units_are_read_or_told(
 ) -> None:
     values = 970.5 + np.arange(60.0)
     rows = [f"{i};{cells.get(i, form.format(value))}" for i, value in enumerate(values)]
-    (tmp_path / "log.txt").write_text("\n".join(["t [s];p", *rows]), encoding="utf-8")
+    (tmp_path / "log.txt").write_text("\n".join(["t [s];p [hPa abs]", *rows]), encoding="utf-8")
     log = read_log(tmp_path / "log.txt")
     values[list(cells)] = np.nan
     np.testing.assert_array_equal(log.series["p"].values, values)
@@ -303,6 +303,7 @@ BROKEN = [
     ("log.json", '{"rate": 50}', "no table was found: neither a list of records nor columns"),
     ("log.txt", "a x=1 1669112211000\na x=1 1669112212000\nb x=2 1669112213000\n", "line 3 is of"),
     ("log.csv", "t [s],p\n0,1 bar\n1,2 bar\n2,300 mbar\n", "'2 bar' in row 3, '300 mbar' in row 4"),
+    ("log.csv", "t [s],p [bar]\n0,950 mbar\n1,960 mbar\n", "'bar', and row 3 .*'960 mbar'"),
 ]  # fmt: skip
 
 

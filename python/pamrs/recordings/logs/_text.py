@@ -23,7 +23,7 @@ from pamrs.recordings.dialect import (
     is_useful,
 )
 from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, series_of_texts
-from pamrs.recordings.logs._words import split_heading, understood_unit, unwrapped
+from pamrs.recordings.logs._words import same_unit, split_heading, understood_unit, unwrapped
 from pamrs.recordings.table import (
     NO_VALUE,
     Lines,
@@ -477,12 +477,18 @@ def _of_texts(
         if len(units) > 1:
             some = (f"{cells[row]!r} in row {table.row_numbers[row]}" for row in units.values())
             raise RecordingError(f"its cells have several units: {told_few(some)}")
+        ((unit, row),) = units.items()
+        if series.unit and not same_unit(series.unit, unit):
+            raise RecordingError(
+                f"its heading has the unit {series.unit!r}, and row {table.row_numbers[row]} "
+                f"has another one, {cells[row]!r}"
+            )
         numbers = [
             match["number"] if match else cell for match, cell in zip(matches, cells, strict=True)
         ]
         mark = thousands or _grouped(numbers, decimal)
         values, lost = numbers_of_cells(numbers, mark, decimal)
-        made = replace(series, values=values, unit=series.unit or units.popitem()[0])
+        made = replace(series, values=values, unit=series.unit or unit)
         return made, lost, _told_mark(cells, mark) if thousands is None else []
     if (count := len(set(cells))) > _MOST_TEXTS:
         raise RecordingError(f"it has {count} different texts")

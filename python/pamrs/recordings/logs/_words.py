@@ -132,6 +132,24 @@ def understood_unit(text: str) -> Written | None:
     return Written("Nm") if lower == "nm" else None
 
 
+def same_unit(first: str, second: str) -> bool:
+    """True where two texts are the same unit in a log's words, or both are none that is known.
+
+    Parameters
+    ----------
+    first, second : str
+        ``"sec"`` and ``"s"``, or ``"bar abs"`` and ``"bar"``: what a pressure is measured from may
+        be said by one of them alone.
+
+    Returns
+    -------
+    bool
+    """
+    known = [understood_unit(text) for text in (first, second)]
+    one, other = (parse_unit(each.unit) if each else None for each in known)
+    return one == other
+
+
 _PLAIN: Final = str.maketrans({"²": "2", "³": "3", "₂": "2", "\N{MICRO SIGN}": "u", "μ": "u"})
 
 
