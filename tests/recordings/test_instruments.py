@@ -301,6 +301,7 @@ def test_a_pause_between_dates_lasts_as_long_as_they_say(tmp_path: Path) -> None
 BROKEN = [
     ("log.jsonl", '{"t": 0}\n{"t": 1,}\n', r"log.jsonl: line 2, column \d+: "),
     ("log.json", '{"rate": 50}', "no table was found: neither a list of records nor columns"),
+    *(("log.json", text, "no table was found") for text in ("[{}]", "[[]]")),
     ("log.txt", "a x=1 1669112211000\na x=1 1669112212000\nb x=2 1669112213000\n", "line 3 is of"),
     ("log.csv", "t [s],p\n0,1 bar\n1,2 bar\n2,300 mbar\n", "'2 bar' in row 3, '300 mbar' in row 4"),
     ("log.csv", "t [s],p [bar]\n0,950 mbar\n1,960 mbar\n", "'bar', and row 3 .*'960 mbar'"),
@@ -323,12 +324,15 @@ def test_what_is_not_understood_is_told_with_its_place(
         {"t": {"0": 0, "1": 1, "2": 2}, "rig/p": {"0": 1, "1": None, "2": 3.0}},
         {"columns": ["t", "rig/p"], "index": [0, 1, 2], "data": [[0, 1], [1, None], [2, 3.0]]},
         [["t", "rig/p"], [0, 1], [1, None], [2, 3.0]],
+        {"rig": {"t": [0, 1, 2], "p": [1, None, 3.0]}},
+        {"t": [0, 1, 2], "rig": {"p": [1, None, 3.0], "angle": [1], "load": []}},
     ],
 )
 def test_json_is_a_table_in_every_form(tmp_path: Path, content: Any) -> None:
     (tmp_path / "log.json").write_text(json.dumps(content), encoding="utf-8")
     log = read_log(tmp_path / "log.json")
     np.testing.assert_array_equal(log.series["rig/p"].values, [1.0, np.nan, 3.0])
+    assert ("rig/angle (1), rig/load (0)" in "".join(log.remarks)) == ("angle" in str(content))
 
 
 # ------------------------------------------------------------------------- slow sensors

@@ -40,13 +40,13 @@ def read_json(path: Path, form: TextFormat) -> Log:
     except json.JSONDecodeError:
         lines = enumerate(text.splitlines(), start=1)
         content = [_loaded(path, number, line) for number, line in lines if line.strip()]
-    rows = _rows(content)
-    if not rows:
+    said: list[str] = []
+    rows = _rows(content, said)
+    if not any(rows):
         raise RecordingError(f"{path}: no table was found: neither a list of records nor columns")
     check_size(len(rows), sum(map(len, rows)), str(path), len(rows[0]))
-    return log_of_lines(
-        path, lines_of_rows([_text(each) for each in row] for row in rows), form, "."
-    )
+    body = lines_of_rows([_text(each) for each in row] for row in rows)
+    return log_of_lines(path, body, form, ".", said)
 
 
 def _loaded(path: Path, number: int, line: str) -> Any:
@@ -56,8 +56,8 @@ def _loaded(path: Path, number: int, line: str) -> Any:
         raise RecordingError(f"{path}: line {number}, column {error.colno}: {error.msg}") from error
 
 
-def _rows(content: Any) -> list[list[Any]]:
-    """Headings and rows of the first table in what was read; empty where there is none."""
+def _rows(content: Any, remarks: list[str]) -> list[list[Any]]:
+    """Headings and rows of the first table in what was read, without cells where there is none."""
     if isinstance(content, list) and any(isinstance(each, Mapping) for each in content):
         flat = [_flat(each) for each in content if isinstance(each, Mapping)]
         names = list(dict.fromkeys(name for each in flat for name in each))
@@ -67,15 +67,19 @@ def _rows(content: Any) -> list[list[Any]]:
     if not isinstance(content, Mapping):
         return []
     inner = [each for each in content.values() if isinstance(each, Mapping)]
-    if inner and len(inner) == len(content) and all(set(each) == set(inner[0]) for each in inner):
+    alike = len(inner) == len(content) and all(set(each) == set(inner[0]) for each in inner)
+    if alike and not any(isinstance(v, (Mapping, list)) for each in inner for v in each.values()):
         content = {name: list(each.values()) for name, each in content.items()}  # as pandas has it
-    lists = {name: each for name, each in _flat(content).items() if isinstance(each, list) and each}
-    for each in lists.values():
-        if isinstance(each[0], (Mapping, list)) and (rows := _rows(each)):
+    lists = {name: each for name, each in _flat(content).items() if isinstance(each, list)}
+    for each in filter(None, lists.values()):
+        if isinstance(each[0], (Mapping, list)) and any(rows := _rows(each, remarks)):
             heads = content.get("columns")
             return [heads, *rows] if isinstance(heads, list) and rows is each else rows
-    counts = [len(each) for each in lists.values()]
+    counts = [len(each) for each in lists.values() if each]
     usual = max(counts, key=counts.count, default=0)
+    others = [f"{name} ({len(each)})" for name, each in lists.items() if len(each) != usual]
+    if others:
+        remarks.append(f"left out: {', '.join(others)}: the rest have {usual} values each")
     columns = {name: each for name, each in lists.items() if len(each) == usual}
     return [list(columns), *map(list, zip(*columns.values(), strict=True))] if columns else []
 
