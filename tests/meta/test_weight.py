@@ -31,7 +31,7 @@ PACKAGES = {
     "findings": 947,
     "fit": 2937,
     "library": 71,
-    "recordings": 5181,
+    "recordings": 5183,
     "report": 2059,
     "rig": 2222,
     "rigs": 139,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1198,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37390
+MOST = 37392
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

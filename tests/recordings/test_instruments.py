@@ -304,6 +304,7 @@ BROKEN = [
     *(("log.json", text, "no table was found") for text in ("[{}]", "[[]]")),
     ("log.txt", "a x=1 1669112211000\na x=1 1669112212000\nb x=2 1669112213000\n", "line 3 is of"),
     ("log.csv", "t [s],p\n0,1 bar\n1,2 bar\n2,300 mbar\n", "'2 bar' in row 3, '300 mbar' in row 4"),
+    ("log.txt", "t:0 p:950 mbar\n" * 9 + "t:9 p:0.98 bar\n", "line 't:9 p:0.98 bar' has p in"),
     ("log.csv", "t [s],p [bar]\n0,950 mbar\n1,960 mbar\n", "'bar', and row 3 .*'960 mbar'"),
 ]  # fmt: skip
 

@@ -106,7 +106,7 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
             lost = len(lines) - len(apart[0])
             remarks += [f"lines without a time: {lost}, left out"] if lost else []
             times, lines = apart
-        labelled = labelled_rows(lines, times)
+        labelled = labelled_rows(lines, times, source)
         if labelled is not None:
             rows = lines_of_rows(labelled[0])
             return log_of_lines(path, rows, form, ".", [*remarks, *labelled[1]])
@@ -583,7 +583,7 @@ def _pairs(line: str) -> list[tuple[str, str, str]] | None:
 
 
 def labelled_rows(
-    lines: Sequence[str], times: Sequence[str] | None
+    lines: Sequence[str], times: Sequence[str] | None, source: str
 ) -> tuple[list[list[str]], list[str]] | None:
     """Rows of lines like ``t:0.02,u:7.00,p:1.5 bar``.
 
@@ -593,6 +593,8 @@ def labelled_rows(
         All lines.
     times : sequence of str, optional
         What stood before the arrow of each; the first column then.
+    source : str
+        The file, for messages.
 
     Returns
     -------
@@ -602,15 +604,25 @@ def labelled_rows(
     remarks : list of str
         What was left out.
     None where most lines are not so.
+
+    Raises
+    ------
+    RecordingError
+        If a label has several units.
     """
     middle = lines[len(lines) // 2 :][:100]
     if sum(_pairs(line) is not None for line in middle) < _MOST * max(len(middle), 1):
         return None
     found = [_pairs(line) for line in lines]
     columns: dict[str, str] = {}
-    for pairs in found:
+    for line, pairs in zip(lines, found, strict=True):
         for name, _, unit in pairs or ():
             columns[name] = columns.get(name) or unit
+            if unit and not same_unit(columns[name], unit):
+                raise RecordingError(
+                    f"{source}: line {line[:80]!r} has {name} in {unit!r}, an earlier one in "
+                    f"{columns[name]!r}: write one unit for each label"
+                )
     place = {name: index for index, name in enumerate(columns)}
     before = ["time"] if times is not None else []
     rows = [[*before, *(f"{name} [{unit}]" if unit else name for name, unit in columns.items())]]
