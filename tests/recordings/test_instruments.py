@@ -245,6 +245,7 @@ def test_a_dialect_is_read_right_or_told(tmp_path: Path, name: str) -> None:
         ("n,dt,p", "{0},10,{0}.5"),
         ("n,dt,p\n0,10,0.5\n1,10,0.5\nn,dt,p", "{0},10,{0}.5"),
         ("n;of;p", "{0};dt;2"),
+        ("n,of,p", "{0},dt,2"),
     ],
 )
 def test_what_is_no_spacing_is_not_taken_for_one(tmp_path: Path, head: str, row: str) -> None:

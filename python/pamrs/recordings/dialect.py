@@ -19,7 +19,7 @@ _POINT = re.compile(r"[+-]?(\d+\.\d*|\.\d+)([eE][+-]?\d+)?")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")  # 1,234: a thousand, or one and a bit
 #: A number with its unit in one cell: ``2.31 bar``.
 QUANTITY: Final = re.compile(
-    r"(?P<number>[-+]?(?:\d[\d.,]*|[.,]\d+)(?:[eE][-+]?\d+)?)\s?(?P<unit>(?:[A-Za-z°µ%]\S{0,9})?)"
+    r"(?P<number>[-+]?(?:\d[\d.,]*|[.,]\d+)(?:[eE][-+]?\d+)?)\s?(?P<unit>(?:[A-Za-z°µ%][^\s,;|]{0,9})?)"
 )
 _GIVE: Final = "in the .toml description or to load_force_map"
 
