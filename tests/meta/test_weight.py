@@ -31,7 +31,7 @@ PACKAGES = {
     "findings": 947,
     "fit": 2937,
     "library": 71,
-    "recordings": 5183,
+    "recordings": 5192,
     "report": 2059,
     "rig": 2222,
     "rigs": 139,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27389,
+    "tests": 27401,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1198,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37392
+MOST = 37401
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

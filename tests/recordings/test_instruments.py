@@ -244,7 +244,6 @@ def test_a_dialect_is_read_right_or_told(tmp_path: Path, name: str) -> None:
         ("Interval;1.000,0 us\nn;p", "{0};{0},5"),
         ("n,dt,p", "{0},10,{0}.5"),
         ("n,dt,p\n0,10,0.5\n1,10,0.5\nn,dt,p", "{0},10,{0}.5"),
-        ("n;of;p", "{0};dt;2"),
         ("n,of,p", "{0},dt,2"),
     ],
 )
@@ -286,6 +285,23 @@ def test_numbers_with_units_are_read_or_told(
     values[list(cells)] = np.nan
     np.testing.assert_array_equal(log.series["p"].values, values)
     assert [remark[: len(told)] for remark in log.remarks] == [told]
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_status_beside_values_parts_no_sensor(tmp_path: Path, count: int) -> None:
+    times = [i // count for i in range(60)]  # so many rows have the same one
+    times[22] = times[21]
+    rows = [f"{t},{i},{'WARN' if i % 17 == 5 else 'OK'}" for i, t in enumerate(times)]
+    (tmp_path / "log.csv").write_text("\n".join(["time,value [bar],status", *rows]))
+    log = read_log(tmp_path / "log.csv")
+    np.testing.assert_array_equal(log.series["value"].values, np.arange(60))
+    assert log.series["status"].labels == ("OK", "WARN")
+
+
+def test_a_long_table_may_have_one_of_its_sensors_more_often(tmp_path: Path) -> None:
+    rows = [f"{i},{n},{i}" for i in range(60) for n in ("valve", "p")[: 1 + (i % 10 == 0)]]
+    (tmp_path / "log.csv").write_text("\n".join(["time,channel,value", *rows]))
+    assert np.isfinite(read_log(tmp_path / "log.csv").series["p"].values).sum() == 6
 
 
 def test_a_pause_between_dates_lasts_as_long_as_they_say(tmp_path: Path) -> None:

@@ -371,6 +371,10 @@ def _pivoted(found: list[Series], remarks: list[str]) -> list[Series]:
     if len(values) != 1 or len(names) != 1 or values[0].labels:
         return found
     (value,), (name,) = values, names
+    if not any(
+        _times_shared(item, name) for item in found if item is not value and not item.labels
+    ):
+        return found
     made = []
     for place, label in enumerate(name.labels):
         rows = name.values == place
@@ -380,6 +384,17 @@ def _pivoted(found: list[Series], remarks: list[str]) -> list[Series]:
         made.append(Series(called, np.where(rows, value.values, np.nan), unit))
     remarks.append(f"{name.name} says of what {value.name} is in each row: {told_few(name.labels)}")
     return [*(item for item in found if item not in (value, name, *said)), *made]
+
+
+def _times_shared(clock: Series, name: Series) -> bool:
+    """True where the times of a clock come again for several labels, and each label once at each:
+    those of the commonest label may come alone, where it is read more often than the others.
+    """
+    _, at = np.unique(clock.values, return_inverse=True)
+    pairs = np.unique([at, name.values], axis=1)
+    shared = np.bincount(at)[at] > 1
+    rarer = name.values != np.argmax(np.bincount(name.values.astype(int)))
+    return bool(pairs.shape[1] > 0.9 * len(at) and np.mean(shared[rarer]) > 0.5)
 
 
 def _dated(
