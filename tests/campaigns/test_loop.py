@@ -333,6 +333,14 @@ def test_a_folder_of_another_rig_and_a_device_of_another_rig_are_refused(rig, di
         campaign(None, rig, out=tmp_path)
 
 
+@pytest.mark.parametrize("name", ["rig.toml", "result.json", "step_01"])
+def test_a_file_that_no_campaign_wrote_is_not_written_over(rig, tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(CaseError, match=f"out = {tmp_path} is not allowed: it holds {name} and"):
+        campaign(None, rig, out=tmp_path)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")]
+
+
 @pytest.mark.slow
 def test_a_leak_is_found_from_one_poor_log(tmp_path):
     """The whole of it as ``make campaign`` runs it, nothing stood in for."""

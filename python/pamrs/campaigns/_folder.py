@@ -130,7 +130,8 @@ class Folder:
     Raises
     ------
     CaseError
-        If the folder holds the campaign of another rig, or a file of it cannot be read.
+        If the folder holds the campaign of another rig, or files that no campaign wrote and one
+        would write over, or a file of it cannot be read.
     """
 
     def __init__(self, path: Path, rig: Rig) -> None:
@@ -141,6 +142,13 @@ class Folder:
         path.mkdir(parents=True, exist_ok=True)
         file, model = path / _FILE, path / "rig.toml"
         if not file.exists():
+            written = ("rig.toml", "result.json", "step_*")
+            theirs = next((own.name for name in written for own in path.glob(name)), "")
+            if theirs:
+                raise CaseError(
+                    f"out = {path} is not allowed: it holds {theirs} and no {_FILE}, so no "
+                    "campaign made it; a new folder is needed"
+                )
             write_atomically(model, rig.to_toml_text())
             self.save()
             return

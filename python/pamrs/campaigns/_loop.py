@@ -131,7 +131,7 @@ def campaign(
         If the device failed or was lost; the safe command was written, the recording is kept, and
         the same call goes on.
     CaseError
-        If the folder holds the campaign of another rig.
+        If the folder holds the campaign of another rig, or files that one would write over.
     DiagnosisError
         If the recordings of this rig cannot be diagnosed, or no experiment is made for it.
     """
