@@ -341,6 +341,49 @@ def test_a_file_that_no_campaign_wrote_is_not_written_over(rig, tmp_path, name):
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")]
 
 
+@pytest.mark.parametrize(
+    ("name", "changed", "told"),
+    [
+        ("fast_triangle", {"bench": Bench(limits={"valve_command": (4.0, 6.0)})}, "allow 4 to 6"),
+        ("fast_triangle", {"bench": Bench(highest=1.5e5)}, "ask for other commands"),
+        ("fast_triangle", {"budget": Budget(minutes=0.2)}, "of 0.2 minutes"),
+        ("other_payload", {"bench": Bench(unattended=True)}, "another payload"),
+        ("other_payload", {"device": True}, "another payload"),
+    ],
+)
+def test_an_open_step_that_is_not_allowed_any_more_is_withdrawn(
+    rig, pool, diagnosed, tmp_path, name, changed, told
+):
+    diagnosed.answers += [Found(rig, ask=asks(rig, pool, name)), Found(rig, settled=True)]
+    before = log(rig, tmp_path, pool) * 2
+    found = campaign(None, rig, before, out=tmp_path, budget=LIMITS)
+    assert [step.name for step in found.steps] == [name]
+    device = SimulatedBench(rig) if changed.pop("device", False) else None
+    given = {"budget": LIMITS, **changed}
+    found = campaign(device, rig, before, out=tmp_path, **given)
+    step = found.steps[0]
+    assert told in step.withdrawn
+    assert (step.recordings, step.finished) == ([], False)
+    assert f"{name}: withdrawn, " in found.summary()
+    assert f"Withdrawn: {step.withdrawn[:9]}" in (tmp_path / "campaign.html").read_text()
+
+
+def test_each_replay_of_a_run_that_fails_counts_in_the_budget(rig, pool, diagnosed, tmp_path):
+    class Dead(SimulatedBench):
+        def read(self):
+            return None
+
+    diagnosed.answers.append(Found(rig, ask=asks(rig, pool, "fast_triangle")))
+    given = {"out": tmp_path, "bench": FAST, "budget": Budget(60.0, 2, 5000.0)}
+    before = log(rig, tmp_path, pool)
+    for _ in range(2):
+        with pytest.raises(LiveError):
+            campaign(Dead(rig), rig, before, **given)
+    found = campaign(SimulatedBench(rig), rig, before, **given)
+    assert (found.why, len(found.steps[0].spent)) == ("budget", 2)
+    assert found.steps[0].withdrawn == "the budget would be passed, 3 of 2 runs"
+
+
 @pytest.mark.slow
 def test_a_leak_is_found_from_one_poor_log(tmp_path):
     """The whole of it as ``make campaign`` runs it, nothing stood in for."""

@@ -68,6 +68,8 @@ class Step:
         What was known with it.
     changed : bool or None
         Whether it changed anything; None until it was judged.
+    withdrawn : str
+        Why it may not be played any more; empty where it may, or was.
     """
 
     number: int
@@ -88,6 +90,7 @@ class Step:
     scores: dict[str, dict[str, float]] = field(default_factory=dict)
     after: dict[str, Any] | None = None
     changed: bool | None = None
+    withdrawn: str = ""
 
     @property
     def telling(self) -> str:
@@ -184,8 +187,9 @@ class Folder:
 
     @property
     def open(self) -> Step | None:
-        """The step that was proposed and not judged yet."""
-        return self.steps[-1] if self.steps and self.steps[-1].changed is None else None
+        """The step that was proposed, and neither judged nor withdrawn yet."""
+        last = self.steps[-1] if self.steps else None
+        return last if last and last.changed is None and not last.withdrawn else None
 
     @property
     def spent(self) -> Cost:
@@ -194,8 +198,8 @@ class Folder:
 
     @property
     def played(self) -> list[tuple[str, dict[str, Any]]]:
-        """Name and numbers of what was played."""
-        return [(step.name, step.numbers) for step in self.steps]
+        """Name and numbers of what was played to its end."""
+        return [(step.name, step.numbers) for step in self.steps if step.finished]
 
     def recordings(self) -> list[Recording]:
         """Recordings of complete runs, in their order."""
@@ -220,9 +224,13 @@ class Folder:
             count += 1
         return path
 
+    def sent(self, step: Step) -> Path:
+        """The file that has the commands of a step."""
+        return self.home(step) / "commands.csv"
+
     def protocol(self, step: Step) -> Protocol | None:
         """The commands of a step, as they were written down; None where it is done by hand."""
-        file = self.home(step) / "commands.csv"
+        file = self.sent(step)
         if not file.exists():
             return None
         time, *others = columns_of(file).items()
@@ -251,7 +259,7 @@ class Folder:
         home.mkdir(exist_ok=True)
         protocol = protocol_of(one)
         if protocol is not None:
-            write_atomically(home / "commands.csv", protocol.to_csv())
+            write_atomically(self.sent(step), protocol.to_csv())
         step.rivals = self._foretell(home, proposal)
         write_atomically(home / "sheet.md", sheet(step, proposal, commands))
         self.steps.append(step)

@@ -31,6 +31,7 @@ from pamrs.control.live import Device
 from pamrs.diagnosis import Diagnosis, DiagnosisSettings, diagnose
 from pamrs.diagnosis.next_experiment import foretold
 from pamrs.errors import CaseError, DiagnosisError, ParameterError, SimulationError
+from pamrs.experiments import protocol_of
 from pamrs.recordings import Case, Recording, load_case
 from pamrs.rig import Rig
 
@@ -71,6 +72,7 @@ class Campaign:
         lines = [f"{len(self.steps)} steps in {self.path}"]
         for step in self.steps:
             after = step.after["headline"] if step.after else "waits for its recording"
+            after = f"withdrawn, {step.withdrawn}" if step.withdrawn else after
             lines.append(f"  {step.number}  {step.name}{' again' * step.repeats}: {after}")
         return "\n".join([*lines, self.text])
 
@@ -180,6 +182,7 @@ class _Work:
     def run(self) -> Campaign:
         """On from where it was, to an end."""
         self.folder.ended = {}
+        self.withdraw()
         while not self.folder.ended:
             step = self.folder.open
             if step is None:
@@ -216,6 +219,38 @@ class _Work:
             return every
         return {effect: every[effect] for effect in unseen(found) if effect in every}
 
+    @property
+    def pool(self) -> Pool:
+        """Experiments that may be played now."""
+        return pool_of(
+            self.commands,
+            self.recordings,
+            self.folder.played,
+            (self.budget, self.folder.spent),
+            self.settings,
+            hands=self.device is None and not self.commands.bench.unattended,
+        )
+
+    def withdraw(self) -> None:
+        """Withdraw a step that waits to be played, and would not be proposed as it is by now."""
+        step = self.folder.open
+        if step is None or step.finished or (self.device is None and self.waiting(step).exists()):
+            return
+        pool, sent = self.pool, self.folder.sent(step)
+        one = {**pool.new, **pool.again}.get(step.name)
+        protocol = None if one is None else protocol_of(one)
+        if step.name in pool.refused:
+            step.withdrawn = pool.refused[step.name]
+        elif any(own.name == step.name for own in pool.by_hand):
+            step.withdrawn = "it takes another payload, or somebody at the bench"
+        elif one is None or (protocol and protocol.to_csv()) != (
+            sent.read_text(encoding="utf-8") if sent.exists() else None
+        ):
+            step.withdrawn = "this bench and these recordings ask for other commands"
+        if step.withdrawn:
+            self.folder.save()
+            self.say(f"step {step.number}: {step.name} is withdrawn: {step.withdrawn}")
+
     def diagnose(self) -> None:
         """Diagnose all recordings."""
         every = self.recordings
@@ -241,15 +276,8 @@ class _Work:
         if over:
             return self.end("budget", f"The budget allows no further run ({over}); open is: {what}")
         wanted = self.wanted
-        pool = pool_of(
-            self.commands,
-            recordings,
-            self.folder.played,
-            (self.budget, spent),
-            self.settings,
-            hands=self.device is None and not self.commands.bench.unattended,
-        )
-        last = self.folder.steps[-_UNCHANGED:]
+        pool = self.pool
+        last = [step for step in self.folder.steps if step.finished][-_UNCHANGED:]
         stuck = len(last) == _UNCHANGED and not any(step.changed for step in last)
         proposal = None
         if not (stuck and any(step.repeats for step in last)):
@@ -287,13 +315,16 @@ class _Work:
                 return found
         return None
 
+    def waiting(self, step: Step) -> Path:
+        """The file that a person puts the recording of a step into."""
+        return self.folder.home(step) / "recording.csv"
+
     def recorded(self, step: Step) -> bool:
         """Play a step, or take what a person brought; True where its recording is there then."""
         home = self.folder.home(step)
         if self.device is None:
-            waiting = home / "recording.csv"
-            if waiting.exists():
-                self.take(waiting)
+            if self.waiting(step).exists():
+                self.take(self.waiting(step))
                 return True
             self.end("no recording", f"Waits for the recording of {home / 'sheet.md'}")
             return False
