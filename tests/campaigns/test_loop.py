@@ -17,9 +17,10 @@ from pamrs.campaigns import Bench, Budget, _choice, _loop, campaign
 from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._play import play
 from pamrs.campaigns.simulated import SimulatedBench
+from pamrs.channels import unit_of
 from pamrs.control.live import LiveError
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.errors import CaseError, ParameterError, RecordingError
+from pamrs.errors import CaseError, DiagnosisError, ParameterError, RecordingError
 from pamrs.experiments import library, protocol_of
 from pamrs.findings import NextExperiment, RankedExperiment
 
@@ -382,6 +383,64 @@ def test_each_replay_of_a_run_that_fails_counts_in_the_budget(rig, pool, diagnos
     found = campaign(SimulatedBench(rig), rig, before, **given)
     assert (found.why, len(found.steps[0].spent)) == ("budget", 2)
     assert found.steps[0].withdrawn == "the budget would be passed, 3 of 2 runs"
+
+
+def heard(rig, one, path, *names):
+    """A recording of an experiment with some of its channels."""
+    run, columns = one.simulate(rig), ["time", *names]
+    table = np.column_stack([run.time, *(run[name] for name in names)])
+    units = [unit_of(name) for name in columns]
+    heads = ",".join(f"{name} [{unit}]" for name, unit in zip(columns, units, strict=True))
+    np.savetxt(path, table, delimiter=",", header=heads, comments="")
+    return path
+
+
+def test_a_recording_that_cannot_be_of_its_step_is_refused(rig, pool, diagnosed, tmp_path):
+    diagnosed.answers.append(Found(rig, ask=asks(rig, pool, "fast_triangle")))
+    given, out = (rig, log(rig, tmp_path, pool)), tmp_path / "out"
+    campaign(None, *given, out=out, budget=LIMITS)
+    for names, told in (
+        (["muscle_pressure", "joint_angle"], "step 1 needs valve_command"),
+        (["valve_command"], "step 1 needs one of .*joint_angle"),
+    ):
+        file = heard(rig, pool["fast_triangle"], tmp_path / "brought.csv", *names)
+        with pytest.raises(CaseError, match=told):
+            campaign(None, *given, out=out, budget=LIMITS, recording=file)
+    assert not list((out / "step_01").glob("recording*"))
+
+
+@pytest.mark.parametrize("by", ["recording", "device", "waiting"])
+def test_a_recording_that_cannot_be_diagnosed_is_replaced(
+    rig, pool, diagnosed, tmp_path, monkeypatch, by
+):
+    diagnosed.answers += [Found(rig, ask=asks(rig, pool, "fast_triangle"))]
+    given, out = (rig, log(rig, tmp_path, pool)), tmp_path / "out"
+    names = ("valve_command", "muscle_pressure", "joint_angle", "supply_pressure")
+    file = heard(rig, pool["fast_triangle"], tmp_path / "brought.csv", *names)
+    campaign(None, *given, out=out, budget=LIMITS)
+    good = _loop.diagnose
+
+    def failing(case, **options):
+        if len(case.recordings) > 1:
+            raise DiagnosisError("it stands still")
+        return good(case, **options)
+
+    monkeypatch.setattr(_loop, "diagnose", failing)
+    (out / "step_01" / "recording.csv").write_bytes(file.read_bytes())
+    with pytest.raises(DiagnosisError, match=r"recording_1.csv cannot .*: it stands still; step 1"):
+        campaign(None, *given, out=out, budget=LIMITS)
+    waits = campaign(None, *given, out=out, budget=LIMITS)
+    assert (waits.why, len(waits.steps[0].spent)) == ("no recording", 1)
+    monkeypatch.setattr(_loop, "diagnose", good)
+    diagnosed.answers.append(Found(rig, settled=True))
+    brought = {"recording": file} if by == "recording" else {}
+    if by == "waiting":
+        (out / "step_01" / "recording.csv").write_bytes(file.read_bytes())
+    device = SimulatedBench(rig) if by == "device" else None
+    found = campaign(device, *given, out=out, budget=LIMITS, bench=FAST, **brought)
+    (step,) = found.steps
+    assert found.why == "decided"
+    assert step.recordings == ["step_01/recording_1.csv", "step_01/recording_2.csv"]
 
 
 @pytest.mark.slow

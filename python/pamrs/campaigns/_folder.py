@@ -205,11 +205,11 @@ class Folder:
         """Recordings of complete runs, in their order."""
         return [self.recording(step) for step in self.steps if step.finished and step.recordings]
 
-    def recording(self, step: Step) -> Recording:
-        """The complete run of a step."""
+    def recording(self, step: Step, path: Path | None = None) -> Recording:
+        """The complete run of a step, as it is kept or from another file."""
         ambient = float(self.rig.tables("gas")[""]["ambient_pressure"])
         name = f"{step.number:02d} {step.name}"
-        file = self.path / step.recordings[-1]
+        file = path or self.path / step.recordings[-1]
         found = load_recording(file, name=name, ambient_pressure=ambient)
         changed = {
             name: OwnValue(value, self.rig.parameter(name).value)

@@ -29,8 +29,14 @@ from pamrs.campaigns._page import write_pages
 from pamrs.campaigns._play import play
 from pamrs.control.live import Device
 from pamrs.diagnosis import Diagnosis, DiagnosisSettings, diagnose
-from pamrs.diagnosis.next_experiment import foretold
-from pamrs.errors import CaseError, DiagnosisError, ParameterError, SimulationError
+from pamrs.diagnosis.next_experiment import foretold, measurable
+from pamrs.errors import (
+    CaseError,
+    DiagnosisError,
+    ParameterError,
+    RecordingError,
+    SimulationError,
+)
 from pamrs.experiments import protocol_of
 from pamrs.recordings import Case, Recording, load_case
 from pamrs.rig import Rig
@@ -133,9 +139,11 @@ def campaign(
         If the device failed or was lost; the safe command was written, the recording is kept, and
         the same call goes on.
     CaseError
-        If the folder holds the campaign of another rig, or files that one would write over.
+        If the folder holds the campaign of another rig, or files that one would write over; if
+        `recording` lacks a command of its step, or has no channel that the rig can be measured by.
     DiagnosisError
-        If the recordings of this rig cannot be diagnosed, or no experiment is made for it.
+        If the recordings of this rig cannot be diagnosed, or no experiment is made for it; a step
+        whose recording cannot takes another one, or is played again.
     """
     work = _Work(device, rig, case, Folder(Path(out), rig), budget, bench, settings, progress)
     if recording is not None:
@@ -325,6 +333,7 @@ class _Work:
         if self.device is None:
             if self.waiting(step).exists():
                 self.take(self.waiting(step))
+                self.waiting(step).unlink()  # it is kept under its number
                 return True
             self.end("no recording", f"Waits for the recording of {home / 'sheet.md'}")
             return False
@@ -342,19 +351,23 @@ class _Work:
         return True
 
     def take(self, path: Path) -> None:
-        """Take the recording of the step that waits for one."""
+        """Take the recording of the step that waits for one, or that was not judged by another."""
         step = self.folder.open
-        if step is None or step.finished:
+        if step is None:
             raise CaseError(f"recording = {path} is not allowed: no step waits for one")
+        protocol, has = self.folder.protocol(step), self.folder.recording(step, path).channels
+        sent = list(protocol.commands) if protocol else []
+        heard = [name for name in measurable(self.rig) if name not in sent]
+        missing = [name for name in sent if name not in has]
+        if missing or not any(name in has for name in heard):
+            needed = missing or [f"one of {', '.join(heard)}"]
+            raise CaseError(
+                f"recording = {path} is not allowed: it has {', '.join(has)}, and step "
+                f"{step.number} needs {', '.join(needed)}"
+            )
         kept = self.folder.next_file(step, "".join(path.suffixes) or ".csv")
         shutil.copyfile(path, kept)
         step.recordings.append(str(kept.relative_to(self.folder.path)))
-        try:
-            self.folder.recording(step)
-        except Exception:
-            kept.unlink()
-            step.recordings.pop()
-            raise
         step.spent.append(step.seconds)
         step.finished = True
         self.folder.save()
@@ -366,7 +379,15 @@ class _Work:
             step.scores = foretold(rivals, self.folder.recording(step), self.settings)
         except (DiagnosisError, SimulationError):  # such a run tells nothing of these models alone
             step.scores = {}
-        self.diagnose()
+        try:
+            self.diagnose()
+        except (CaseError, DiagnosisError, RecordingError, SimulationError) as error:
+            step.finished = False
+            self.folder.save()
+            raise DiagnosisError(
+                f"{self.folder.path / step.recordings[-1]} cannot be diagnosed with the others: "
+                f"{error}; step {step.number} takes another recording"
+            ) from error
         step.after = told(self.found)
         step.changed = _changed(step.before, step.after)
         self.folder.save()
