@@ -325,6 +325,13 @@ def test_a_folder_of_another_rig_and_a_device_of_another_rig_are_refused(rig, di
         ParameterError, match="device = /dev/ttyACM0 takes valve_command.left, which"
     ):
         campaign(other, rig, out=tmp_path)
+    told = SimpleNamespace(
+        commands=("valve_command",), channels=("time", "muscle_pressure.left"), name="board"
+    )
+    with pytest.raises(
+        ParameterError, match="tells muscle_pressure.left, which is not allowed: .*muscle_pressure,"
+    ):
+        campaign(told, rig, out=tmp_path)
     with pytest.raises(ParameterError, match="no command that a device could play"):
         campaign(other, pamrs.rigs.sealed_chamber(), out=tmp_path / "sealed")
     with pytest.raises(CaseError, match="holds the campaign of another rig"):

@@ -125,6 +125,10 @@ def late(bench, found):
             "joint_angle = nan is not allowed",
         ),
         (lambda bench, found: found | {"time": 1.0}, "its readings stand still"),
+        (
+            lambda bench, found: found | {"muscle_pressure.left": 1e5},
+            "its channel muscle_pressure.left is not allowed: one of time, .*muscle_pressure,",
+        ),
     ],
 )
 def test_a_device_that_does_not_answer_as_it_should_is_stopped_and_named(rig, tmp_path, how, told):

@@ -185,6 +185,13 @@ class _Work:
                 f"device = {getattr(device, 'name', device)} takes {', '.join(taken)}, which is "
                 f"not allowed: rig {rig.name!r} has {', '.join(self.commands.ranges)}"
             )
+        known = ("time", *measurable(rig))
+        unknown = [name for name in getattr(device, "channels", ()) if name not in known]
+        if unknown:
+            raise ParameterError(
+                f"device = {getattr(device, 'name', device)} tells {', '.join(unknown)}, which is "
+                f"not allowed: rig {rig.name!r} has {', '.join(known)}"
+            )
         self.found: Diagnosis | None = None
 
     def run(self) -> Campaign:
