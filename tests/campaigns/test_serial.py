@@ -14,7 +14,6 @@ from pamrs.campaigns import Bench
 from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._play import play
 from pamrs.campaigns.serial import SerialDevice, checked, signed
-from pamrs.campaigns.simulated import SimulatedBench
 from pamrs.control.live import LiveError
 from pamrs.errors import ParameterError
 from pamrs.findings import Protocol
@@ -185,6 +184,5 @@ def test_the_example_board_speaks_the_same():
     text = (Path(__file__).parents[2] / "examples" / "pamrs_board.ino").read_text()
     assert f'HELLO = "{HELLO}"' in text
     assert re.search(r"millis\(\) - heard > WATCHDOG\) \{ drive\(SAFE\)", text)
-    assert SimulatedBench.name == "simulated"
     for answer in ('"OK"', '"E "', "'?'", "'R'", "'W'"):
         assert answer in text
