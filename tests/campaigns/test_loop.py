@@ -20,7 +20,7 @@ from pamrs.campaigns.simulated import SimulatedBench
 from pamrs.channels import unit_of
 from pamrs.control.live import LiveError
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.errors import CaseError, DiagnosisError, ParameterError, RecordingError
+from pamrs.errors import CaseError, DiagnosisError, ParameterError, RecordingError, SimulationError
 from pamrs.experiments import library, protocol_of
 from pamrs.findings import NextExperiment, RankedExperiment
 
@@ -448,6 +448,41 @@ def test_a_recording_that_cannot_be_diagnosed_is_replaced(
     (step,) = found.steps
     assert found.why == "decided"
     assert step.recordings == ["step_01/recording_1.csv", "step_01/recording_2.csv"]
+
+
+def test_a_rival_that_leaves_its_range_takes_no_score_from_the_others(
+    rig, pool, diagnosed, tmp_path, monkeypatch
+):
+    rivals = [("none", rig, 0.5), ("leak_muscle", rig.with_parameters({"arm.payload": 12.0}), 0.5)]
+    ask = asks(rig, pool, "step_and_shut", hypotheses=rivals)
+    diagnosed.answers += [Found(rig, ask=ask), Found(rig, settled=True)]
+    scored = _loop.foretold
+
+    def leaving(hypotheses, *given):
+        if any(label == "leak_muscle" for label, *_ in hypotheses):
+            raise SimulationError("leak_muscle leaves its range")
+        return scored(hypotheses, *given)
+
+    monkeypatch.setattr(_loop, "foretold", leaving)
+    given = (rig, log(rig, tmp_path, pool))
+    found = campaign(SimulatedBench(rig), *given, out=tmp_path, bench=FAST, budget=LIMITS)
+    (step,) = found.steps
+    assert list(step.scores) == ["none"]
+    assert max(step.scores["none"].values()) < 1.5
+    assert "leaves its range" in (tmp_path / "step_01" / "page.html").read_text()
+
+
+def test_why_a_run_is_asked_for_is_true(rig, pool, diagnosed, tmp_path):
+    whys = []
+    for found, verdict in ((None, ""), (Found(rig), "effects"), (Found(rig), "unlisted")):
+        if found is not None:
+            found.verdict = verdict
+        own = _choice.Pool(dict(pool), {}, {}, {}, [])
+        given = (own, {}, [], DiagnosisSettings())
+        whys.append(_choice.proposed(rig, found, *given, repeat=False).why)
+    assert whys[0].startswith("Nothing was recorded yet:")
+    assert whys[1].startswith("The answer is not settled:")
+    assert whys[2].startswith("Not all that is missing has a name yet:")
 
 
 @pytest.mark.slow

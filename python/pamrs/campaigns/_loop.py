@@ -381,11 +381,12 @@ class _Work:
 
     def judge(self, step: Step) -> None:
         """Score what was foretold of a run, and diagnose with it."""
-        rivals = self.folder.rivals(step)
-        try:
-            step.scores = foretold(rivals, self.folder.recording(step), self.settings)
-        except (DiagnosisError, SimulationError):  # such a run tells nothing of these models alone
-            step.scores = {}
+        step.scores = {}
+        for rival in self.folder.rivals(step):
+            try:
+                step.scores |= foretold([rival], self.folder.recording(step), self.settings)
+            except (DiagnosisError, SimulationError):  # this run tells nothing of this model
+                continue
         try:
             self.diagnose()
         except (CaseError, DiagnosisError, RecordingError, SimulationError) as error:
