@@ -22,8 +22,10 @@ float gauge(int pin) {  // [Pa] of a transducer of 0.5 to 4.5 V for 0 to 14 bar,
   return (analogRead(pin) * (5.0 / 1023.0) - 0.5) * (14.0e5 / 4.0);
 }
 
+String now();
+
 void tell(String& line) {  // the channels of HELLO in their order, SI units
-  line += String(micros() * 1e-6, 6);
+  line += now();
   line += ' '; line += String(gauge(MUSCLE), 1);
   line += ' '; line += String(gauge(SUPPLY), 1);
   line += ' '; line += String(analogRead(ANGLE) * (5.235988 / 1023.0), 6);  // [rad] of 300 deg
@@ -33,6 +35,17 @@ void tell(String& line) {  // the channels of HELLO in their order, SI units
 
 String line;
 unsigned long heard;
+
+String now() {  // [s] since the start; micros() begins again every 71.6 min, a float has 7 digits
+  static unsigned long wraps = 0, before = 0;
+  unsigned long us = micros();
+  if (us < before) wraps++;
+  before = us;
+  uint64_t all = ((uint64_t)wraps << 32) | us;
+  char text[20];
+  snprintf(text, sizeof text, "%lu.%06lu", (unsigned long)(all / 1000000), (unsigned long)(all % 1000000));
+  return text;
+}
 
 byte sum(const String& text) {
   byte found = 0;
@@ -89,6 +102,7 @@ void setup() {
 }
 
 void loop() {
+  now();  // sees every wrap, asked or not
   if (millis() - heard > WATCHDOG) { drive(SAFE); heard = millis(); }
   while (Serial.available()) {
     char c = (char)Serial.read();

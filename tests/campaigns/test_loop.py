@@ -17,9 +17,10 @@ from pamrs.campaigns import Bench, Budget, _choice, _loop, campaign
 from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._play import play
 from pamrs.campaigns.simulated import SimulatedBench
+from pamrs.channels import unit_of
 from pamrs.control.live import LiveError
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.errors import CaseError, ParameterError, RecordingError
+from pamrs.errors import CaseError, DiagnosisError, ParameterError, RecordingError, SimulationError
 from pamrs.experiments import library, protocol_of
 from pamrs.findings import NextExperiment, RankedExperiment
 
@@ -324,6 +325,13 @@ def test_a_folder_of_another_rig_and_a_device_of_another_rig_are_refused(rig, di
         ParameterError, match="device = /dev/ttyACM0 takes valve_command.left, which"
     ):
         campaign(other, rig, out=tmp_path)
+    told = SimpleNamespace(
+        commands=("valve_command",), channels=("time", "muscle_pressure.left"), name="board"
+    )
+    with pytest.raises(
+        ParameterError, match="tells muscle_pressure.left, which is not allowed: .*muscle_pressure,"
+    ):
+        campaign(told, rig, out=tmp_path)
     with pytest.raises(ParameterError, match="no command that a device could play"):
         campaign(other, pamrs.rigs.sealed_chamber(), out=tmp_path / "sealed")
     with pytest.raises(CaseError, match="holds the campaign of another rig"):
@@ -331,6 +339,150 @@ def test_a_folder_of_another_rig_and_a_device_of_another_rig_are_refused(rig, di
     (tmp_path / "campaign.json").write_text("{}")
     with pytest.raises(CaseError, match="campaign.json: is no campaign"):
         campaign(None, rig, out=tmp_path)
+
+
+@pytest.mark.parametrize("name", ["rig.toml", "result.json", "step_01"])
+def test_a_file_that_no_campaign_wrote_is_not_written_over(rig, tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(CaseError, match=f"out = {tmp_path} is not allowed: it holds {name} and"):
+        campaign(None, rig, out=tmp_path)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")]
+
+
+@pytest.mark.parametrize(
+    ("name", "changed", "told"),
+    [
+        ("fast_triangle", {"bench": Bench(limits={"valve_command": (4.0, 6.0)})}, "allow 4 to 6"),
+        ("fast_triangle", {"bench": Bench(highest=1.5e5)}, "ask for other commands"),
+        ("fast_triangle", {"budget": Budget(minutes=0.2)}, "of 0.2 minutes"),
+        ("other_payload", {"bench": Bench(unattended=True)}, "another payload"),
+        ("other_payload", {"device": True}, "another payload"),
+    ],
+)
+def test_an_open_step_that_is_not_allowed_any_more_is_withdrawn(
+    rig, pool, diagnosed, tmp_path, name, changed, told
+):
+    diagnosed.answers += [Found(rig, ask=asks(rig, pool, name)), Found(rig, settled=True)]
+    before = log(rig, tmp_path, pool) * 2
+    found = campaign(None, rig, before, out=tmp_path, budget=LIMITS)
+    assert [step.name for step in found.steps] == [name]
+    device = SimulatedBench(rig) if changed.pop("device", False) else None
+    given = {"budget": LIMITS, **changed}
+    found = campaign(device, rig, before, out=tmp_path, **given)
+    step = found.steps[0]
+    assert told in step.withdrawn
+    assert (step.recordings, step.finished) == ([], False)
+    assert f"{name}: withdrawn, " in found.summary()
+    assert f"Withdrawn: {step.withdrawn[:9]}" in (tmp_path / "campaign.html").read_text()
+
+
+def test_each_replay_of_a_run_that_fails_counts_in_the_budget(rig, pool, diagnosed, tmp_path):
+    class Dead(SimulatedBench):
+        def read(self):
+            return None
+
+    diagnosed.answers.append(Found(rig, ask=asks(rig, pool, "fast_triangle")))
+    given = {"out": tmp_path, "bench": FAST, "budget": Budget(60.0, 2, 5000.0)}
+    before = log(rig, tmp_path, pool)
+    for _ in range(2):
+        with pytest.raises(LiveError):
+            campaign(Dead(rig), rig, before, **given)
+    found = campaign(SimulatedBench(rig), rig, before, **given)
+    assert (found.why, len(found.steps[0].spent)) == ("budget", 2)
+    assert found.steps[0].withdrawn == "the budget would be passed, 3 of 2 runs"
+
+
+def heard(rig, one, path, *names):
+    """A recording of an experiment with some of its channels."""
+    run, columns = one.simulate(rig), ["time", *names]
+    table = np.column_stack([run.time, *(run[name] for name in names)])
+    units = [unit_of(name) for name in columns]
+    heads = ",".join(f"{name} [{unit}]" for name, unit in zip(columns, units, strict=True))
+    np.savetxt(path, table, delimiter=",", header=heads, comments="")
+    return path
+
+
+def test_a_recording_that_cannot_be_of_its_step_is_refused(rig, pool, diagnosed, tmp_path):
+    diagnosed.answers.append(Found(rig, ask=asks(rig, pool, "fast_triangle")))
+    given, out = (rig, log(rig, tmp_path, pool)), tmp_path / "out"
+    campaign(None, *given, out=out, budget=LIMITS)
+    for names, told in (
+        (["muscle_pressure", "joint_angle"], "step 1 needs valve_command"),
+        (["valve_command"], "step 1 needs one of .*joint_angle"),
+    ):
+        file = heard(rig, pool["fast_triangle"], tmp_path / "brought.csv", *names)
+        with pytest.raises(CaseError, match=told):
+            campaign(None, *given, out=out, budget=LIMITS, recording=file)
+    assert not list((out / "step_01").glob("recording*"))
+
+
+@pytest.mark.parametrize("by", ["recording", "device", "waiting"])
+def test_a_recording_that_cannot_be_diagnosed_is_replaced(
+    rig, pool, diagnosed, tmp_path, monkeypatch, by
+):
+    diagnosed.answers += [Found(rig, ask=asks(rig, pool, "fast_triangle"))]
+    given, out = (rig, log(rig, tmp_path, pool)), tmp_path / "out"
+    names = ("valve_command", "muscle_pressure", "joint_angle", "supply_pressure")
+    file = heard(rig, pool["fast_triangle"], tmp_path / "brought.csv", *names)
+    campaign(None, *given, out=out, budget=LIMITS)
+    good = _loop.diagnose
+
+    def failing(case, **options):
+        if len(case.recordings) > 1:
+            raise DiagnosisError("it stands still")
+        return good(case, **options)
+
+    monkeypatch.setattr(_loop, "diagnose", failing)
+    (out / "step_01" / "recording.csv").write_bytes(file.read_bytes())
+    with pytest.raises(DiagnosisError, match=r"recording_1.csv cannot .*: it stands still; step 1"):
+        campaign(None, *given, out=out, budget=LIMITS)
+    waits = campaign(None, *given, out=out, budget=LIMITS)
+    assert (waits.why, len(waits.steps[0].spent)) == ("no recording", 1)
+    monkeypatch.setattr(_loop, "diagnose", good)
+    diagnosed.answers.append(Found(rig, settled=True))
+    brought = {"recording": file} if by == "recording" else {}
+    if by == "waiting":
+        (out / "step_01" / "recording.csv").write_bytes(file.read_bytes())
+    device = SimulatedBench(rig) if by == "device" else None
+    found = campaign(device, *given, out=out, budget=LIMITS, bench=FAST, **brought)
+    (step,) = found.steps
+    assert found.why == "decided"
+    assert step.recordings == ["step_01/recording_1.csv", "step_01/recording_2.csv"]
+
+
+def test_a_rival_that_leaves_its_range_takes_no_score_from_the_others(
+    rig, pool, diagnosed, tmp_path, monkeypatch
+):
+    rivals = [("none", rig, 0.5), ("leak_muscle", rig.with_parameters({"arm.payload": 12.0}), 0.5)]
+    ask = asks(rig, pool, "step_and_shut", hypotheses=rivals)
+    diagnosed.answers += [Found(rig, ask=ask), Found(rig, settled=True)]
+    scored = _loop.foretold
+
+    def leaving(hypotheses, *given):
+        if any(label == "leak_muscle" for label, *_ in hypotheses):
+            raise SimulationError("leak_muscle leaves its range")
+        return scored(hypotheses, *given)
+
+    monkeypatch.setattr(_loop, "foretold", leaving)
+    given = (rig, log(rig, tmp_path, pool))
+    found = campaign(SimulatedBench(rig), *given, out=tmp_path, bench=FAST, budget=LIMITS)
+    (step,) = found.steps
+    assert list(step.scores) == ["none"]
+    assert max(step.scores["none"].values()) < 1.5
+    assert "leaves its range" in (tmp_path / "step_01" / "page.html").read_text()
+
+
+def test_why_a_run_is_asked_for_is_true(rig, pool, diagnosed, tmp_path):
+    whys = []
+    for found, verdict in ((None, ""), (Found(rig), "effects"), (Found(rig), "unlisted")):
+        if found is not None:
+            found.verdict = verdict
+        own = _choice.Pool(dict(pool), {}, {}, {}, [])
+        given = (own, {}, [], DiagnosisSettings())
+        whys.append(_choice.proposed(rig, found, *given, repeat=False).why)
+    assert whys[0].startswith("Nothing was recorded yet:")
+    assert whys[1].startswith("The answer is not settled:")
+    assert whys[2].startswith("Not all that is missing has a name yet:")
 
 
 @pytest.mark.slow

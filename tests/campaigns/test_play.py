@@ -125,6 +125,10 @@ def late(bench, found):
             "joint_angle = nan is not allowed",
         ),
         (lambda bench, found: found | {"time": 1.0}, "its readings stand still"),
+        (
+            lambda bench, found: found | {"muscle_pressure.left": 1e5},
+            "its channel muscle_pressure.left is not allowed: one of time, .*muscle_pressure,",
+        ),
     ],
 )
 def test_a_device_that_does_not_answer_as_it_should_is_stopped_and_named(rig, tmp_path, how, told):
@@ -164,11 +168,40 @@ def test_a_command_of_the_wrong_sign_is_seen_before_anything_is_recorded(rig, tm
             )
 
     bench, path = Swapped(rig), tmp_path / "run.csv"
-    with pytest.raises(LiveError, match="valve_command = 3.75 V vents by the rig file") as error:
+    with pytest.raises(
+        LiveError, match="valve_command = 3.75 V, below null_voltage = 5 V, vents by"
+    ) as error:
         play(bench, Commands(rig, Bench()), protocol(), path)
     assert "the sign of the command is wrong" in str(error.value)
     assert written(bench)[-1] == 5.0
     assert path.read_text() == ""
+
+
+@pytest.mark.parametrize("begins", [0.5e5, 2e5, 3e5])
+def test_chambers_come_to_where_a_run_begins_whatever_the_safe_commands_are(begins, tmp_path):
+    rig, path = pamrs.rigs.antagonistic_joint(), tmp_path / "run.csv"
+    (one,) = library(rig, DiagnosisSettings(), sample_time=PERIOD, only=["fast_triangle"])
+    names = [f"chamber.{side}.initial_pressure" for side in ("flexor", "extensor")]
+    bench = SimulatedBench(rig.with_parameters(dict.fromkeys(names, begins)))
+    safe = {"valve_command.flexor": 0.0, "valve_command.extensor": 0.0}
+    play(bench, Commands(rig, Bench(safe=safe, settle=8.0)), protocol_of(one), path)
+    recording = pamrs.load_recording(path)
+    for side in ("flexor", "extensor"):
+        assert recording.channels[f"muscle_pressure.{side}"][0] == pytest.approx(2e5, rel=0.1)
+    assert written(bench)[0] == written(bench)[-1]
+
+
+def test_before_a_run_a_valve_stays_within_its_limits(tmp_path):
+    rig = pamrs.rigs.antagonistic_joint()
+    names = ("valve_command.flexor", "valve_command.extensor")
+    limits = dict.fromkeys(names, (4.0, 5.25))
+    empty = dict.fromkeys(
+        ("chamber.flexor.initial_pressure", "chamber.extensor.initial_pressure"), 0.0
+    )
+    bench, still = SimulatedBench(rig.with_parameters(empty)), np.arange(3) * PERIOD
+    sent = Protocol("x", still, dict.fromkeys(names, np.full(3, 5.0)), dict.fromkeys(names, "V"))
+    play(bench, Commands(rig, Bench(limits=limits, settle=1.0)), sent, tmp_path / "run.csv")
+    assert max(max(command.values()) for command in written(bench)) == 5.25
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")

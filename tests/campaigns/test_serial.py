@@ -2,6 +2,8 @@
 
 import os
 import re
+import shutil
+import subprocess
 import threading
 import time
 from pathlib import Path
@@ -14,13 +16,13 @@ from pamrs.campaigns import Bench
 from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._play import play
 from pamrs.campaigns.serial import SerialDevice, checked, signed
-from pamrs.campaigns.simulated import SimulatedBench
 from pamrs.control.live import LiveError
 from pamrs.errors import ParameterError
 from pamrs.findings import Protocol
 from tests.simulation.refusals import refused
 
 pty = pytest.importorskip("pty")
+SKETCH = Path(__file__).parents[2] / "examples" / "pamrs_board.ino"
 HELLO = "pamrs valve_command > time muscle_pressure supply_pressure joint_angle"
 
 
@@ -182,9 +184,25 @@ def test_a_cable_that_is_pulled_ends_the_run_and_keeps_it(tmp_path):
 
 def test_the_example_board_speaks_the_same():
     """The sketch has the greeting, the answers and the watchdog that the protocol asks for."""
-    text = (Path(__file__).parents[2] / "examples" / "pamrs_board.ino").read_text()
+    text = SKETCH.read_text()
     assert f'HELLO = "{HELLO}"' in text
     assert re.search(r"millis\(\) - heard > WATCHDOG\) \{ drive\(SAFE\)", text)
-    assert SimulatedBench.name == "simulated"
     for answer in ('"OK"', '"E "', "'?'", "'R'", "'W'"):
         assert answer in text
+
+
+@pytest.mark.skipif(shutil.which("c++") is None, reason="no compiler")
+def test_the_time_of_the_example_board_goes_on_where_its_counter_begins_again(tmp_path):
+    text = SKETCH.read_text()
+    own = re.search(r"^String now\(\) \{.*?^\}", text, re.MULTILINE | re.DOTALL).group()
+    assert "loop() {\n  now();" in text
+    source, program = tmp_path / "now.cpp", tmp_path / "now"
+    source.write_text(
+        "#include <cstdint>\n#include <cstdio>\n#include <iostream>\n#include <string>\n"
+        "using String = std::string;\nuint32_t counted;\nuint32_t micros() { return counted; }\n"
+        f"{own}\nint main() {{ for (uint64_t us = 0; us < 15000000000; us += 1000000001)\n"
+        '{ counted = (uint32_t)us; std::cout << now() << "\\n"; } }\n'
+    )
+    subprocess.run(["c++", "-o", str(program), str(source)], check=True)
+    told = subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout
+    assert told.split() == [f"{k * 1000}.{k:06d}" for k in range(15)]

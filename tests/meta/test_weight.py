@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1109,
-    "campaigns": 1097,
+    "campaigns": 1159,
     "cli": 1424,
     "control": 4596,
     "design": 530,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27401,
+    "tests": 27537,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1198,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37401
+MOST = 37463
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -80,8 +80,9 @@ class Commands:
         Of every command what is safe, its lowest and its highest value [SI].
     rest : dict of str to float
         What is written before a run [SI].
-    begins : dict of str to ((str, ...), float)
-        Of every pressure that valves move these, and the pressure that a run begins at [Pa].
+    begins : dict of str to (dict of str to float, float)
+        Of every pressure that valves move their commands, each with the one that closes its valve
+        [V], and the pressure that a run begins at [Pa].
 
     Raises
     ------
@@ -115,7 +116,7 @@ class Commands:
             )
 
         self.begins = {
-            chain.pressure: (chain.commands, chain.before(rig))
+            chain.pressure: ({n: _usual(rig, n)[0] for n in chain.commands}, chain.before(rig))
             for chain in chains_of(rig)
             if chain.valves and not set(chain.commands) & set(bench.rest)
         }

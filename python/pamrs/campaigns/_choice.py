@@ -278,7 +278,7 @@ def _showing(
     rivals: list[tuple[str, Any, float]],
 ) -> ProposedRun | None:
     """The allowed experiment that shows most of what was not seen yet, at the least effort; else
-    the cheapest one, where something is missing that has no name.
+    the cheapest one, where nothing was recorded or the answer is not settled.
     """
 
     def merit(experiment: Experiment) -> tuple[int, float]:
@@ -292,10 +292,14 @@ def _showing(
         return ProposedRun(
             best, f"It would show {_effects(shown)} at the usual size.", False, rivals
         )
-    if diagnosis is None or not diagnosis.answer.settled:
-        why = "What is missing has no name yet: another motion shows what it depends on."
-        return ProposedRun(best, why, False, rivals)
-    return None
+    if diagnosis is not None and diagnosis.answer.settled:
+        return None
+    why = "The answer is not settled: another motion may tell more."
+    if diagnosis is None:
+        why = "Nothing was recorded yet: this one takes the least effort."
+    elif _is_nameless(diagnosis):
+        why = "Not all that is missing has a name yet: another motion shows what it depends on."
+    return ProposedRun(best, why, False, rivals)
 
 
 def _shown_by(experiment: Experiment, blind: Mapping[str, list[str]]) -> list[str]:

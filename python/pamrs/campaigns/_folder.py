@@ -68,6 +68,8 @@ class Step:
         What was known with it.
     changed : bool or None
         Whether it changed anything; None until it was judged.
+    withdrawn : str
+        Why it may not be played any more; empty where it may, or was.
     """
 
     number: int
@@ -88,6 +90,7 @@ class Step:
     scores: dict[str, dict[str, float]] = field(default_factory=dict)
     after: dict[str, Any] | None = None
     changed: bool | None = None
+    withdrawn: str = ""
 
     @property
     def telling(self) -> str:
@@ -130,7 +133,8 @@ class Folder:
     Raises
     ------
     CaseError
-        If the folder holds the campaign of another rig, or a file of it cannot be read.
+        If the folder holds the campaign of another rig, or files that no campaign wrote and one
+        would write over, or a file of it cannot be read.
     """
 
     def __init__(self, path: Path, rig: Rig) -> None:
@@ -141,6 +145,13 @@ class Folder:
         path.mkdir(parents=True, exist_ok=True)
         file, model = path / _FILE, path / "rig.toml"
         if not file.exists():
+            written = ("rig.toml", "result.json", "step_*")
+            theirs = next((own.name for name in written for own in path.glob(name)), "")
+            if theirs:
+                raise CaseError(
+                    f"out = {path} is not allowed: it holds {theirs} and no {_FILE}, so no "
+                    "campaign made it; a new folder is needed"
+                )
             write_atomically(model, rig.to_toml_text())
             self.save()
             return
@@ -176,8 +187,9 @@ class Folder:
 
     @property
     def open(self) -> Step | None:
-        """The step that was proposed and not judged yet."""
-        return self.steps[-1] if self.steps and self.steps[-1].changed is None else None
+        """The step that was proposed, and neither judged nor withdrawn yet."""
+        last = self.steps[-1] if self.steps else None
+        return last if last and last.changed is None and not last.withdrawn else None
 
     @property
     def spent(self) -> Cost:
@@ -186,18 +198,18 @@ class Folder:
 
     @property
     def played(self) -> list[tuple[str, dict[str, Any]]]:
-        """Name and numbers of what was played."""
-        return [(step.name, step.numbers) for step in self.steps]
+        """Name and numbers of what was played to its end."""
+        return [(step.name, step.numbers) for step in self.steps if step.finished]
 
     def recordings(self) -> list[Recording]:
         """Recordings of complete runs, in their order."""
         return [self.recording(step) for step in self.steps if step.finished and step.recordings]
 
-    def recording(self, step: Step) -> Recording:
-        """The complete run of a step."""
+    def recording(self, step: Step, path: Path | None = None) -> Recording:
+        """The complete run of a step, as it is kept or from another file."""
         ambient = float(self.rig.tables("gas")[""]["ambient_pressure"])
         name = f"{step.number:02d} {step.name}"
-        file = self.path / step.recordings[-1]
+        file = path or self.path / step.recordings[-1]
         found = load_recording(file, name=name, ambient_pressure=ambient)
         changed = {
             name: OwnValue(value, self.rig.parameter(name).value)
@@ -212,9 +224,13 @@ class Folder:
             count += 1
         return path
 
+    def sent(self, step: Step) -> Path:
+        """The file that has the commands of a step."""
+        return self.home(step) / "commands.csv"
+
     def protocol(self, step: Step) -> Protocol | None:
         """The commands of a step, as they were written down; None where it is done by hand."""
-        file = self.home(step) / "commands.csv"
+        file = self.sent(step)
         if not file.exists():
             return None
         time, *others = columns_of(file).items()
@@ -243,7 +259,7 @@ class Folder:
         home.mkdir(exist_ok=True)
         protocol = protocol_of(one)
         if protocol is not None:
-            write_atomically(home / "commands.csv", protocol.to_csv())
+            write_atomically(self.sent(step), protocol.to_csv())
         step.rivals = self._foretell(home, proposal)
         write_atomically(home / "sheet.md", sheet(step, proposal, commands))
         self.steps.append(step)

@@ -29,8 +29,15 @@ from pamrs.campaigns._page import write_pages
 from pamrs.campaigns._play import play
 from pamrs.control.live import Device
 from pamrs.diagnosis import Diagnosis, DiagnosisSettings, diagnose
-from pamrs.diagnosis.next_experiment import foretold
-from pamrs.errors import CaseError, DiagnosisError, ParameterError, SimulationError
+from pamrs.diagnosis.next_experiment import foretold, measurable
+from pamrs.errors import (
+    CaseError,
+    DiagnosisError,
+    ParameterError,
+    RecordingError,
+    SimulationError,
+)
+from pamrs.experiments import protocol_of
 from pamrs.recordings import Case, Recording, load_case
 from pamrs.rig import Rig
 
@@ -71,6 +78,7 @@ class Campaign:
         lines = [f"{len(self.steps)} steps in {self.path}"]
         for step in self.steps:
             after = step.after["headline"] if step.after else "waits for its recording"
+            after = f"withdrawn, {step.withdrawn}" if step.withdrawn else after
             lines.append(f"  {step.number}  {step.name}{' again' * step.repeats}: {after}")
         return "\n".join([*lines, self.text])
 
@@ -131,9 +139,11 @@ def campaign(
         If the device failed or was lost; the safe command was written, the recording is kept, and
         the same call goes on.
     CaseError
-        If the folder holds the campaign of another rig.
+        If the folder holds the campaign of another rig, or files that one would write over; if
+        `recording` lacks a command of its step, or has no channel that the rig can be measured by.
     DiagnosisError
-        If the recordings of this rig cannot be diagnosed, or no experiment is made for it.
+        If the recordings of this rig cannot be diagnosed, or no experiment is made for it; a step
+        whose recording cannot takes another one, or is played again.
     """
     work = _Work(device, rig, case, Folder(Path(out), rig), budget, bench, settings, progress)
     if recording is not None:
@@ -175,11 +185,19 @@ class _Work:
                 f"device = {getattr(device, 'name', device)} takes {', '.join(taken)}, which is "
                 f"not allowed: rig {rig.name!r} has {', '.join(self.commands.ranges)}"
             )
+        known = ("time", *measurable(rig))
+        unknown = [name for name in getattr(device, "channels", ()) if name not in known]
+        if unknown:
+            raise ParameterError(
+                f"device = {getattr(device, 'name', device)} tells {', '.join(unknown)}, which is "
+                f"not allowed: rig {rig.name!r} has {', '.join(known)}"
+            )
         self.found: Diagnosis | None = None
 
     def run(self) -> Campaign:
         """On from where it was, to an end."""
         self.folder.ended = {}
+        self.withdraw()
         while not self.folder.ended:
             step = self.folder.open
             if step is None:
@@ -216,6 +234,38 @@ class _Work:
             return every
         return {effect: every[effect] for effect in unseen(found) if effect in every}
 
+    @property
+    def pool(self) -> Pool:
+        """Experiments that may be played now."""
+        return pool_of(
+            self.commands,
+            self.recordings,
+            self.folder.played,
+            (self.budget, self.folder.spent),
+            self.settings,
+            hands=self.device is None and not self.commands.bench.unattended,
+        )
+
+    def withdraw(self) -> None:
+        """Withdraw a step that waits to be played, and would not be proposed as it is by now."""
+        step = self.folder.open
+        if step is None or step.finished or (self.device is None and self.waiting(step).exists()):
+            return
+        pool, sent = self.pool, self.folder.sent(step)
+        one = {**pool.new, **pool.again}.get(step.name)
+        protocol = None if one is None else protocol_of(one)
+        if step.name in pool.refused:
+            step.withdrawn = pool.refused[step.name]
+        elif any(own.name == step.name for own in pool.by_hand):
+            step.withdrawn = "it takes another payload, or somebody at the bench"
+        elif one is None or (protocol and protocol.to_csv()) != (
+            sent.read_text(encoding="utf-8") if sent.exists() else None
+        ):
+            step.withdrawn = "this bench and these recordings ask for other commands"
+        if step.withdrawn:
+            self.folder.save()
+            self.say(f"step {step.number}: {step.name} is withdrawn: {step.withdrawn}")
+
     def diagnose(self) -> None:
         """Diagnose all recordings."""
         every = self.recordings
@@ -241,15 +291,8 @@ class _Work:
         if over:
             return self.end("budget", f"The budget allows no further run ({over}); open is: {what}")
         wanted = self.wanted
-        pool = pool_of(
-            self.commands,
-            recordings,
-            self.folder.played,
-            (self.budget, spent),
-            self.settings,
-            hands=self.device is None and not self.commands.bench.unattended,
-        )
-        last = self.folder.steps[-_UNCHANGED:]
+        pool = self.pool
+        last = [step for step in self.folder.steps if step.finished][-_UNCHANGED:]
         stuck = len(last) == _UNCHANGED and not any(step.changed for step in last)
         proposal = None
         if not (stuck and any(step.repeats for step in last)):
@@ -287,13 +330,17 @@ class _Work:
                 return found
         return None
 
+    def waiting(self, step: Step) -> Path:
+        """The file that a person puts the recording of a step into."""
+        return self.folder.home(step) / "recording.csv"
+
     def recorded(self, step: Step) -> bool:
         """Play a step, or take what a person brought; True where its recording is there then."""
         home = self.folder.home(step)
         if self.device is None:
-            waiting = home / "recording.csv"
-            if waiting.exists():
-                self.take(waiting)
+            if self.waiting(step).exists():
+                self.take(self.waiting(step))
+                self.waiting(step).unlink()  # it is kept under its number
                 return True
             self.end("no recording", f"Waits for the recording of {home / 'sheet.md'}")
             return False
@@ -311,31 +358,44 @@ class _Work:
         return True
 
     def take(self, path: Path) -> None:
-        """Take the recording of the step that waits for one."""
+        """Take the recording of the step that waits for one, or that was not judged by another."""
         step = self.folder.open
-        if step is None or step.finished:
+        if step is None:
             raise CaseError(f"recording = {path} is not allowed: no step waits for one")
+        protocol, has = self.folder.protocol(step), self.folder.recording(step, path).channels
+        sent = list(protocol.commands) if protocol else []
+        heard = [name for name in measurable(self.rig) if name not in sent]
+        missing = [name for name in sent if name not in has]
+        if missing or not any(name in has for name in heard):
+            needed = missing or [f"one of {', '.join(heard)}"]
+            raise CaseError(
+                f"recording = {path} is not allowed: it has {', '.join(has)}, and step "
+                f"{step.number} needs {', '.join(needed)}"
+            )
         kept = self.folder.next_file(step, "".join(path.suffixes) or ".csv")
         shutil.copyfile(path, kept)
         step.recordings.append(str(kept.relative_to(self.folder.path)))
-        try:
-            self.folder.recording(step)
-        except Exception:
-            kept.unlink()
-            step.recordings.pop()
-            raise
         step.spent.append(step.seconds)
         step.finished = True
         self.folder.save()
 
     def judge(self, step: Step) -> None:
         """Score what was foretold of a run, and diagnose with it."""
-        rivals = self.folder.rivals(step)
+        step.scores = {}
+        for rival in self.folder.rivals(step):
+            try:
+                step.scores |= foretold([rival], self.folder.recording(step), self.settings)
+            except (DiagnosisError, SimulationError):  # this run tells nothing of this model
+                continue
         try:
-            step.scores = foretold(rivals, self.folder.recording(step), self.settings)
-        except (DiagnosisError, SimulationError):  # such a run tells nothing of these models alone
-            step.scores = {}
-        self.diagnose()
+            self.diagnose()
+        except (CaseError, DiagnosisError, RecordingError, SimulationError) as error:
+            step.finished = False
+            self.folder.save()
+            raise DiagnosisError(
+                f"{self.folder.path / step.recordings[-1]} cannot be diagnosed with the others: "
+                f"{error}; step {step.number} takes another recording"
+            ) from error
         step.after = told(self.found)
         step.changed = _changed(step.before, step.after)
         self.folder.save()

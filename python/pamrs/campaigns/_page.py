@@ -45,7 +45,7 @@ def _told(folder: Folder, step: Step) -> dict[str, Any]:
         {
             "name": hypothesis_label(own["label"]),
             "probability": format_probability(own["probability"]),
-            "left": f"{step.scores[own['label']][step.telling]:.2g}" if step.telling else "",
+            "left": _left(step, own["label"]),
         }
         for own in step.rivals
     ]
@@ -62,6 +62,15 @@ def _told(folder: Folder, step: Step) -> dict[str, Any]:
         "picture": _picture(folder, step),
         "report": f"step_{step.number:02d}/report.html" if step.after else "",
     }
+
+
+def _left(step: Step, label: str) -> str:
+    """Noise levels that a rival left of the telling channel, in words."""
+    if not step.telling:
+        return ""
+    if label not in step.scores:
+        return "leaves its range"
+    return f"{step.scores[label][step.telling]:.2g}"
 
 
 def _open(after: dict[str, Any]) -> str:

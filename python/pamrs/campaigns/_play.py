@@ -78,12 +78,16 @@ class _Player(Controller):
             gap = -1.0
             if begin > _EMPTY:
                 gap = min(max((begin - now) / _GAP, -1.0), 1.0)
-                for valve in valves:
-                    null = self.command_ranges[valve][0]
-                    sent[valve] = null + gap * (null - self.rest[valve])
+                for valve, null in valves.items():
+                    _, low, high = self.command_ranges[valve]
+                    sent[valve] = min(max(null + gap * (null - self.rest[valve]), low), high)
             then = max(self._before.get(name, 0.0), begin)
-            if gap < 0.0 and now > then + _RISEN:
-                told = ", ".join(f"{valve} = {sent[valve]:.4g} V" for valve in valves)
+            vents = gap < 0.0 and all(sent[valve] < null for valve, null in valves.items())
+            if vents and now > then + _RISEN:
+                told = ", ".join(
+                    f"{valve} = {sent[valve]:.4g} V, below null_voltage = {null:.4g} V,"
+                    for valve, null in valves.items()
+                )
                 raise ParameterError(
                     f"{told} vents by the rig file, and {name} rose from {then:.4g} to {now:.4g} "
                     "Pa: the sign of the command is wrong, or the ports of the valve are swapped"

@@ -73,7 +73,11 @@ class Recorder:
         if given is None:
             self.trouble = "it gave no reading"
             return None
+        known = ("time", *self.commands, *self.channels)
         for name, value in given.items():
+            if name not in known:
+                self.trouble = f"its channel {name} is not allowed: one of {', '.join(known)}"
+                return None
             low, high = self.plausible.get(name, (-math.inf, math.inf))
             if not (math.isfinite(value) and low <= value <= high):
                 allowed = f"{low:.5g} to {high:.5g}" if math.isfinite(low) else "a finite number"
