@@ -243,7 +243,7 @@ def test_what_the_rig_lacks_or_its_limits_forbid_is_refused(rig):
 
 
 SLOW = """
-import sys, pamrs, numpy as np
+import signal, sys, pamrs, numpy as np
 from pathlib import Path
 from pamrs.campaigns import Bench
 from pamrs.campaigns._bench import Commands
@@ -251,6 +251,8 @@ from pamrs.campaigns._play import play
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.experiments import chains_of, library, protocol_of
 from pamrs.findings import Protocol
+# whoever runs the tests in the background has it ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
 class Still:
     clock = None
     def read(self): return {"muscle_pressure": 1e5, "joint_angle": 0.5, "supply_pressure": 1e6}
