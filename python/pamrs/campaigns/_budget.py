@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -75,14 +76,12 @@ def cost_of(experiment: Experiment, rig: Rig, settle: float) -> Cost:
     """Cost of an experiment by the model of its rig: its time with what comes before it, and the
     air that its commands let in.
     """
-    litres = 0.0
-    try:
+    litres = 0.0  # where it cannot be run, its air is not known; its time is
+    with suppress(SimulationError):
         found = experiment.simulate(rig)
         gas = rig.tables("gas")[""]
         if "mass_supplied" in found:
             mass = float(found["mass_supplied"][-1])
             volume = mass * gas["gas_constant"] * gas["temperature"] / gas["ambient_pressure"]
             litres = _LITRES * max(volume, 0.0)
-    except SimulationError:  # its air is not known; its time is
-        litres = 0.0
     return Cost(experiment.duration + settle, 1, litres)

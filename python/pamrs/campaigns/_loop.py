@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -222,7 +223,7 @@ class _Work:
         answer has predicted a recording, those not seen yet behind an answer by which nothing is
         missing, else none.
         """
-        found, proven = self.found, len(self.recordings) > 1
+        found, proven = self.found, len(self.before) + len(self.folder.played) > 1
         if found is not None and (not found.answer.settled or (proven and not is_healthy(found))):
             return {}
         if self.folder.shows is None:
@@ -381,12 +382,10 @@ class _Work:
 
     def judge(self, step: Step) -> None:
         """Score what was foretold of a run, and diagnose with it."""
-        step.scores = {}
+        step.scores, recording = {}, self.folder.recording(step)
         for rival in self.folder.rivals(step):
-            try:
-                step.scores |= foretold([rival], self.folder.recording(step), self.settings)
-            except (DiagnosisError, SimulationError):  # this run tells nothing of this model
-                continue
+            with suppress(DiagnosisError, SimulationError):  # this run tells nothing of this model
+                step.scores |= foretold([rival], recording, self.settings)
         try:
             self.diagnose()
         except (CaseError, DiagnosisError, RecordingError, SimulationError) as error:
