@@ -192,16 +192,17 @@ def _other(case: _Case, arm: str, lengths: Sequence[float]) -> None:
     home.mkdir(exist_ok=True)
     for own in ("rig.toml", f"{FREE}.csv"):
         write(home / own, (case.case / own).read_text(encoding="utf-8"))
-    for count in range(RUNS + 1):
-        if count:
-            kind = STANDARD[count - 1] if arm == "standard" else "multisine"
-            seconds = lengths[count - 1] if count <= len(lengths) else _SECONDS
-            names.append(f"run_{count}_{kind}")
-            total += seconds
-            file = home / f"{names[-1]}.csv"
-            if not file.is_file():
-                index = 10 * (1 + ARMS.index(arm)) + count
-                write(file, case.driven(index, kind, seconds))
+    # the free log alone is the same in every arm
+    write(case.result(arm, 0), case.result("campaign", 0).read_text(encoding="utf-8"))
+    for count in range(1, RUNS + 1):
+        kind = STANDARD[count - 1] if arm == "standard" else "multisine"
+        seconds = lengths[count - 1] if count <= len(lengths) else _SECONDS
+        names.append(f"run_{count}_{kind}")
+        total += seconds
+        file = home / f"{names[-1]}.csv"
+        if not file.is_file():
+            index = 10 * (1 + ARMS.index(arm)) + count
+            write(file, case.driven(index, kind, seconds))
         if case.result(arm, count).is_file():
             continue
         write(home / "case.toml", case_toml([(name, "fit") for name in names]))

@@ -21,11 +21,11 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1109,
-    "campaigns": 1159,
+    "campaigns": 1160,
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11067,
+    "diagnosis": 11066,
     "effects": 404,
     "experiments": 1052,
     "findings": 947,

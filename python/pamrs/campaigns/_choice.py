@@ -280,18 +280,17 @@ def _showing(
     """The allowed experiment that shows most of what was not seen yet, at the least effort; else
     the cheapest one, where nothing was recorded or the answer is not settled.
     """
-
-    def merit(experiment: Experiment) -> tuple[int, float]:
-        return -len(_shown_by(experiment, blind)), experiment.effort
-
-    best = min(allowed.values(), key=merit, default=None)
+    best = min(
+        allowed.values(), key=lambda one: (-len(_shown_by(one, blind)), one.effort), default=None
+    )
     if best is None:
         return None
     shown = _shown_by(best, blind)
     if shown:
-        return ProposedRun(
-            best, f"It would show {_effects(shown)} at the usual size.", False, rivals
-        )
+        why = f"It would show {_effects(shown)} at the usual size."
+        if diagnosis is not None and not is_healthy(diagnosis) and diagnosis.answer.settled:
+            why = f"An answer from one recording has to predict another one. {why}"
+        return ProposedRun(best, why, False, rivals)
     if diagnosis is not None and diagnosis.answer.settled:
         return None
     why = "The answer is not settled: another motion may tell more."

@@ -123,7 +123,7 @@ def test_rivals_are_told_apart_as_predicted(pair: str) -> None:
             problem = problem_of(rig, [played], channels, SETTINGS)
             problem = replace(problem, blocks=outcome.problem.blocks)
             right, wrong = (
-                misfit(problem, linear(problem, rivals[k]), outcome.weights) for k in (i, j)
+                misfit(problem, linear(problem, rivals[k]), outcome.errors) for k in (i, j)
             )
             gained.append(wrong.total - right.total)
             missed.append(wrong.rms[key] ** 2 - right.rms[key] ** 2)

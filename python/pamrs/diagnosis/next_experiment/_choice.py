@@ -20,22 +20,24 @@ import numpy as np
 from pamrs._arrays import Array
 from pamrs._losses import Losses
 from pamrs.channels import channel_of, unit_of
-from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, acts_in, bin_width, two_at_a_time
+from pamrs.diagnosis.fit import Problem, acts_in, two_at_a_time
 from pamrs.diagnosis.limits import counted
 from pamrs.diagnosis.next_experiment._differences import (
+    Errors,
     Linear,
     ResidualDifference,
     checked_channels,
     difference,
     elsewhere,
+    errors_of,
     judged_alike,
     linear,
     measurable,
     noise_of,
     problem_of,
     taken,
-    weights_of,
 )
+from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Prepared
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import Term
@@ -116,8 +118,8 @@ class Outcome:
         Blocks, and the recording of each hypothesis.
     models : list of Linear
         Each hypothesis on its own recording.
-    weights : dict
-        As :func:`pamrs.diagnosis.next_experiment.weights_of`.
+    errors : dict
+        Noise and error of the leading model, in the bins of the experiment.
     effort : float
         What it costs, a sensor included, as time [s].
     """
@@ -130,7 +132,7 @@ class Outcome:
     distance: Array
     problems: list[Problem]
     models: list[Linear]
-    weights: dict[Key, float]
+    errors: Errors
     effort: float
 
     @property
@@ -147,7 +149,7 @@ class Outcome:
         def missed(pair: tuple[int, int]) -> ResidualDifference:
             i, j = pair
             there = linear(self.problems[i], self.models[j].rig)
-            return difference(self.problems[i], self.models[i].found, there, self.weights)
+            return difference(self.problems[i], self.models[i].found, there, self.errors)
 
         left = self.left | dict(zip(pairs, two_at_a_time(missed, pairs), strict=True))
         distance = self.distance.copy()
@@ -226,11 +228,11 @@ def outcome_of(
 
     problems = judged_alike(two_at_a_time(cut, zip(rigs, runs, strict=True)))
     own = two_at_a_time(lambda one: linear(*one), zip(problems, rigs, strict=True))
-    weights = weights_of(problems[0], rigs[0])
+    errors = errors_of(problems[0], rigs[0], [p for q in problems[1:] for p in q.recordings])
 
     def missed(pair: tuple[int, int]) -> ResidualDifference:
         i, j = pair
-        return difference(problems[i], own[i].found, elsewhere(problems[i], own[j]), weights)
+        return difference(problems[i], own[i].found, elsewhere(problems[i], own[j]), errors)
 
     pairs = list(itertools.permutations(range(len(rigs)), 2))
     left = dict(zip(pairs, two_at_a_time(missed, pairs), strict=True)) if ranking else {}
@@ -241,7 +243,7 @@ def outcome_of(
     bits = information(probabilities, distance)
     effort = experiment.effort + (settings.sensor_effort if sensor else 0.0)
     outcome = Outcome(
-        experiment, sensor, bits, list(runs), left, distance, problems, own, weights, effort
+        experiment, sensor, bits, list(runs), left, distance, problems, own, errors, effort
     )
     return outcome if ranking else outcome.exactly(pairs, probabilities)
 
@@ -339,9 +341,7 @@ def propose(
     if len(chosen) < 2 or uncertainty < _SETTLED_ENTROPY:
         text = "One hypothesis is left; no experiment can add to that."
         return NextExperiment(text, {}, 0.0)
-    pool = list(experiments or [])
-    if experiments is None:
-        pool = experiments_of(nominal, records, settings)
+    pool = experiments_of(nominal, records, settings) if experiments is None else experiments
     found: list[Outcome] = []
     known: dict[Experiment, list[Simulation] | None] = {}
 
@@ -540,7 +540,7 @@ def _curves(best: Outcome, hypotheses: Sequence[Modelled]) -> Curves:
     labels = [label for label, _, _ in hypotheses]
     prepared = best.problem.recordings[0]
     settings = best.problem.settings
-    width = bin_width(prepared, FIT_BIN_TIME)
+    width = bins_of(prepared)
     return Curves(
         experiment=best.experiment.name,
         text=best.experiment.text,
@@ -557,7 +557,7 @@ def _curves(best: Outcome, hypotheses: Sequence[Modelled]) -> Curves:
             (np.arange(prepared.n // width) + 0.5) * width * prepared.dt, dtype=np.float64
         ),
         left={labels[j]: best.left[0, j].rows[key] for j in others},
-        noise=prepared.noise[channel] / math.sqrt(width) * best.weights[key],
+        noise=prepared.noise[channel] / math.sqrt(width) * best.errors[key].weight,
         command=best.experiment.command,
         samples_counted=counted(prepared, block, settings),
     )

@@ -10,18 +10,22 @@ parameters inside what is known of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pamrs._arrays import Array, solve_normal
 from pamrs.channels import channel_of
-from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, bin_width, free_baseline, residuals
+from pamrs.diagnosis.fit import Key, Problem, free_baseline, residuals
 from pamrs.diagnosis.limits import counted
-from pamrs.diagnosis.noise import bins_of, noise_levels
+from pamrs.diagnosis.noise import (
+    bins_of,
+    model_error,
+    noise_levels,
+    whitening,
+)
 from pamrs.diagnosis.prepare import (
-    Block,
     Prepared,
     Residual,
     available_blocks,
@@ -57,8 +61,7 @@ _MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length", "force", "temper
 
 def usual_noise() -> dict[str, float]:
     """Sample noise of usual transducers by channel [SI]."""
-    pressures = dict.fromkeys(_PRESSURES, _PRESSURE_NOISE)
-    return pressures | {
+    return dict.fromkeys(_PRESSURES, _PRESSURE_NOISE) | {
         "joint_angle": _ANGLE_NOISE,
         "length": _LENGTH_NOISE,
         "force": _FORCE_NOISE,
@@ -214,7 +217,7 @@ class ResidualDifference:
     rms : dict
         By block and recording: root mean square of bin means [noise levels].
     rows : dict
-        By block and recording: the difference in each bin of the fit [channel's unit].
+        By block and recording: the difference in each bin [channel's unit].
     total : float
         Sum of squares on the effective number of samples, the priors' share included.
     """
@@ -228,22 +231,6 @@ class ResidualDifference:
         """Block and recording with the largest difference, and that difference [noise levels]."""
         key = max(self.rms, key=lambda k: self.rms[k])
         return key, self.rms[key]
-
-
-def weights_of(problem: Problem, rig: Rig) -> dict[Key, float]:
-    """Noise level of a block's bin means over a recording, as a multiple of its white part: what
-    drives' noise adds (>= 1).
-    """
-    few = replace(problem.settings, noise_replicates=REPLICATES)
-    fewer = replace(problem, settings=few)
-    found = noise_levels(fewer, core_rig(rig))
-    out = {}
-    for prepared in problem.recordings:
-        for block in problem.blocks:
-            key = (block.name, prepared.recording.name)
-            white = prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
-            out[key] = max(1.0, found[key].binned / white)
-    return out
 
 
 def _free(problem: Problem, rig: Rig) -> dict[str, float]:
@@ -285,9 +272,65 @@ def linear(problem: Problem, rig: Rig) -> Linear:
     return Linear(rig, free, residuals(problem, rig, list(free)))
 
 
-def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> ResidualDifference:
+@dataclass(frozen=True, eq=False)
+class BinErrors:
+    """Noise, and error of the model, in the bins of a block over a recording.
+
+    Attributes
+    ----------
+    weight : float
+        Noise level of the bin means as a multiple of its white part: what drives' noise adds
+        (>= 1).
+    scale : float
+        Factor that makes noise levels of the channel's unit, for as many independent bins as the
+        recording counts for.
+    whiten : callable
+        Takes rows in these units (m,) or (m, k), and takes off what the error of the model may
+        be: :func:`pamrs.diagnosis.noise.whitening`.
+    """
+
+    weight: float
+    scale: float
+    whiten: Callable[[Array], Array]
+
+
+Errors = Mapping[Key, BinErrors]
+"""By block and recording."""
+
+
+def errors_of(problem: Problem, rig: Rig, visited: Sequence[Prepared] = ()) -> Errors:
+    """Noise and usual error of a model over the recordings of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    rig : Rig
+        A model close to them.
+    visited : sequence of Prepared, optional
+        Further recordings whose ranges the curves of that error run over.
+    """
+    fewer = replace(problem, settings=replace(problem.settings, noise_replicates=REPLICATES))
+    stated = model_error(rig, problem.settings.usual_error)
+    levels = noise_levels(fewer, core_rig(rig), stated, [*problem.recordings, *visited])
+    out = {}
+    for prepared in problem.recordings:
+        for block in problem.blocks:
+            level = levels[block.name, prepared.recording.name]
+            white = prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
+            weight = max(1.0, level.noise / white)
+            bins = max(1, prepared.n // bins_of(prepared))
+            # what differs is smooth over a bin: its mean square in all of them is that of a few
+            size = counted(prepared, block, problem.settings) / bins
+            scale = math.sqrt(size) / (weight * white)
+            error = np.zeros((bins, 0)) if level.curves is None else level.curves * scale
+            out[block.name, prepared.recording.name] = BinErrors(weight, scale, whitening(error))
+    return out
+
+
+def misfit(problem: Problem, model: Linear, errors: Errors) -> ResidualDifference:
     """Difference of a model from recordings after its free parameters moved as far as they may."""
-    return _left(problem, {key: r.value for key, r in model.found.items()}, model, weights)
+    return _left(problem, {key: r.value for key, r in model.found.items()}, model, errors)
 
 
 def elsewhere(problem: Problem, model: Linear) -> Linear:
@@ -302,7 +345,7 @@ def elsewhere(problem: Problem, model: Linear) -> Linear:
 
 
 def difference(
-    problem: Problem, truth: Mapping[Key, Residual], other: Linear, weights: Mapping[Key, float]
+    problem: Problem, truth: Mapping[Key, Residual], other: Linear, errors: Errors
 ) -> ResidualDifference:
     """Difference of a model from the recordings that another one makes, free parameters fitted out.
 
@@ -315,55 +358,33 @@ def difference(
         of the cut chain) is taken off.
     other : Linear
         The model that is to explain them, on these recordings.
-    weights : mapping
-        As :func:`weights_of`.
+    errors : mapping
+        As :func:`errors_of`.
     """
     values = {key: r.value - truth[key].value for key, r in other.found.items()}
-    return _left(problem, values, other, weights)
-
-
-def bins_of_fit(
-    problem: Problem,
-    prepared: Prepared,
-    block: Block,
-    found: Residual,
-    weights: Mapping[Key, float],
-) -> tuple[Array, float]:
-    """Sensitivities of a block in bins of the fit, and the factor that makes noise levels of their
-    units, for as many independent ones as the recording counts for.
-    """
-    jacobian = found.jacobian
-    slope, counts = binned(
-        np.zeros((found.value.size, 0)) if jacobian is None else jacobian,
-        found.rows,
-        bin_width(prepared, FIT_BIN_TIME),
-    )
-    key = (block.name, prepared.recording.name)
-    noise_level = weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
-    size = counted(prepared, block, problem.settings)
-    # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in coarse
-    # ones
-    return slope, math.sqrt(size / max(1, int((counts > 0).sum()))) / noise_level
+    return _left(problem, values, other, errors)
 
 
 def _left(
-    problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]
+    problem: Problem, values: Mapping[Key, Array], model: Linear, errors: Errors
 ) -> ResidualDifference:
     spread = np.array(list(model.free.values()))
-    rows, slopes, scales = [], [], []
+    rows, slopes = [], []
     keys: list[Key] = []
     sizes: dict[Key, float] = {}
     for prepared in problem.recordings:
-        width = bin_width(prepared, FIT_BIN_TIME)
+        width = bins_of(prepared)
         for block in problem.blocks:
             key = (block.name, prepared.recording.name)
             r = model.found[key]
             mean, _ = binned(np.where(r.rows, values[key], 0.0), r.rows, width)
-            slope, scale = bins_of_fit(problem, prepared, block, r, weights)
+            slope = np.zeros((mean.size, spread.size))
+            if r.jacobian is not None:
+                slope, _ = binned(r.jacobian, r.rows, width)
+            own = errors[key]
             sizes[key] = counted(prepared, block, problem.settings)
-            rows.append(mean * scale)
-            slopes.append(-slope * spread * scale)
-            scales.append(scale)
+            rows.append(own.whiten(mean * own.scale))
+            slopes.append(own.whiten(-slope * spread * own.scale))
             keys.append(key)
     stacked, jacobian = np.concatenate(rows), np.concatenate(slopes)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -373,10 +394,10 @@ def _left(
         raise SimulationError("a model of the recordings leaves the range of its numbers")
     rms, kept = {}, {}
     start = 0
-    for key, part, scale in zip(keys, rows, scales, strict=True):
-        own = left[start : start + part.size]
+    for key, part in zip(keys, rows, strict=True):
+        beyond, scale = left[start : start + part.size], errors[key].scale
         start += part.size
         # nothing is left of a recording that ends before its beginning is forgotten
-        rms[key] = math.sqrt(float(own @ own) / sizes[key]) if sizes[key] > 0.0 else 0.0
-        kept[key] = own / scale if scale > 0.0 else own
+        rms[key] = math.sqrt(float(beyond @ beyond) / sizes[key]) if sizes[key] > 0.0 else 0.0
+        kept[key] = beyond / scale if scale > 0.0 else beyond
     return ResidualDifference(rms, kept, float(left @ left + moved @ moved))

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
-from pamrs.diagnosis.fit import FIT_BIN_TIME, bin_width
 from pamrs.diagnosis.next_experiment._choice import Modelled
 from pamrs.diagnosis.next_experiment._differences import (
+    errors_of,
     linear,
     measurable,
     misfit,
     problem_of,
-    weights_of,
 )
-from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import prepare
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.recordings import Recording
@@ -53,13 +50,7 @@ def foretold(
         own = tuple(name for name in measurable(rig) if name in recording.channels)
         prepared = prepare(recording, rig, settings)
         problem = problem_of(rig, [prepared], own, settings)
-        weights = weights_of(problem, rig)
-        left = misfit(problem, linear(problem, rig), weights)
-        # in bins as short as those of the fit a sensor's own noise is larger than in its level
-        white = bins_of(prepared) / bin_width(prepared, FIT_BIN_TIME)
+        left = misfit(problem, linear(problem, rig), errors_of(problem, rig))
         channels = {block.name: block.channel for block in problem.blocks}
-        found[label] = {
-            channels[block]: size / math.sqrt(1.0 + (white - 1.0) / weights[block, name] ** 2)
-            for (block, name), size in left.rms.items()
-        }
+        found[label] = {channels[block]: size for (block, _), size in left.rms.items()}
     return found

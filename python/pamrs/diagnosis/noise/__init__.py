@@ -1,7 +1,7 @@
 """Noise levels with the noise of the drives, excess of residuals over them, autocorrelation.
 
 Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `means_in_noises`,
-`model_error`, `error_sizes`, `with_sizes`, `correlation_time`, `inflation`, `apart`.
+`model_error`, `whitening`, `error_sizes`, `with_sizes`, `correlation_time`, `inflation`, `apart`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pamrs.diagnosis.noise._autocorrelation import (
     correlation_time,
     inflation,
 )
-from pamrs.diagnosis.noise._discrepancy import model_error
+from pamrs.diagnosis.noise._discrepancy import model_error, whitening
 from pamrs.diagnosis.noise._levels import (
     LEAST_SIZE,
     Excess,
@@ -39,5 +39,6 @@ __all__ = [
     "means_in_noises",
     "model_error",
     "noise_levels",
+    "whitening",
     "with_sizes",
 ]
