@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from .campaign import draw, scored, specs_of_campaigns, trial_of_campaigns
+from .campaign import draw, highest, scored, specs_of_campaigns, trial_of_campaigns
 from .campaign import page as campaign_page
 from .concealed import make_case, write
 from .design import PLANS, ROUND, SECOND, specs
@@ -283,7 +283,8 @@ def _campaign(args: argparse.Namespace) -> None:
     names = [spec.name for spec in specs_of_campaigns(args.seed, args.cases)]
     found = scored(args.folder, names)
     draw(found, args.folder / "campaign.svg")
-    _shown(campaign_page(found, len(names)), args.folder / "campaign.md")
+    ratios = highest(args.folder, names)
+    _shown(campaign_page(found, len(names), ratios), args.folder / "campaign.md")
 
 
 def _add_selfcheck(add: Add) -> None:

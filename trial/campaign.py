@@ -11,6 +11,7 @@ kept, so that a trial that was stopped goes on.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import multiprocessing
@@ -31,16 +32,29 @@ from .design import SECOND, Spec, specs
 from .drive import FREE, Driver, course
 from .excitation import Excitation, Loop
 from .labs import Lab, table
-from .marks import HEALTHY, family, opened
+from .marks import HEALTHY, family, mark, opened
 from .plan import MANIFEST, SCHEMA
 from .recording import Array, run
 from .rig_kinds import nominal
+from .summary import table as rows_of
 from .summary import wilson
 
 RUNS: Final = 3
 ARMS: Final = ("campaign", "multisine", "standard")
 STANDARD: Final = ("sealed_holds", "slow_triangle", "angle_steps")
 STATES: Final = ("right", "wrong", "open")
+#: columns of the page, and the entries of a mark that they count
+_MARKS: Final = {
+    "first names": "leading",
+    "sets": "holds",
+    "blocks": "located",
+    "wrong values": "wrong",
+    "false names": "false_name",
+}
+#: strata of the distance to the nearest rival from which the limits call a case decidable
+_DECIDABLE: Final = ("4 to 8", "8 to 16", "above 16")
+#: share of the highest pressure recorded before above which a run broke its limit of 1.05
+_BROKEN: Final = 1.1
 _RIGS: Final = ("shoulder", "elbow", "hanging_mass")
 #: what happens once in each recording that was planned, and in no other one
 _EVENTS: Final = ("external_torque", "payload_change")
@@ -274,49 +288,94 @@ def state_of(key: dict[str, Any], result: dict[str, Any] | None) -> str:
     return "right" if is_right(key, result) else "wrong"
 
 
-def scored(out: Path, names: Sequence[str]) -> dict[str, list[dict[str, float]]]:
-    """By arm and number of runs: how many are right, wrong and open, and the time at the bench."""
-    found: dict[str, list[dict[str, float]]] = {}
-    for arm in ARMS:
-        found[arm] = []
-        for count in range(RUNS + 1):
-            states, seconds, leads = [], [], 0
-            for name in names:
-                key = json.loads((out / "keys" / f"{name}.json").read_text(encoding="utf-8"))
-                file = out / "results" / name / f"{arm}_{count}.json"
-                if file.is_file():
-                    told = json.loads(file.read_text(encoding="utf-8"))
-                    states.append(state_of(key, told["result"]))
-                    leads += told["result"] is not None and is_right(key, told["result"])
-                    seconds.append(float(told["seconds"]))
-            row: dict[str, float] = {state: states.count(state) for state in STATES}
-            row["leads"] = leads
-            row["seconds"] = float(np.mean(seconds)) if seconds else math.nan
-            found[arm].append(row)
+def scored(out: Path, names: Sequence[str]) -> dict[str, list[dict[str, Any]]]:
+    """By arm and number of runs: states, marks as (right, asked), and the time at the bench."""
+    found: dict[str, list[dict[str, Any]]] = {arm: [] for arm in ARMS}
+    for arm, count in itertools.product(ARMS, range(RUNS + 1)):
+        states, decidable, seconds, own = [], [], [], []
+        for name in names:
+            key = json.loads((out / "keys" / f"{name}.json").read_text(encoding="utf-8"))
+            file = out / "results" / name / f"{arm}_{count}.json"
+            if not file.is_file():
+                continue
+            told = json.loads(file.read_text(encoding="utf-8"))
+            states.append(state_of(key, told["result"]))
+            own.append(mark(key, told["result"]))
+            seconds.append(float(told["seconds"]))
+            if set(own[-1].tags.get("distance", ())) & set(_DECIDABLE):
+                decidable.append(states[-1])
+        row: dict[str, Any] = {state: states.count(state) for state in STATES}
+        row["decidable"] = decidable.count("right"), len(decidable)
+        row["decidable wrong"] = decidable.count("wrong"), len(decidable)
+        for column, entry in _MARKS.items():
+            asked = [value for one in own if (value := getattr(one, entry)) is not None]
+            row[column] = sum(map(bool, asked)), len(asked)
+        inside = [held for one in own for held in one.inside]
+        row["intervals"] = sum(inside), len(inside)
+        row["seconds"] = float(np.mean(seconds)) if seconds else math.nan
+        found[arm].append(row)
     return found
 
 
-def page(found: dict[str, list[dict[str, float]]], cases: int) -> str:
-    """The scores as a table."""
-    lines = [f"# Campaigns on the independent plant, {cases} cases", ""]
-    lines += [
-        "| arm | runs | right | wrong | open | right, 95 % interval | right, settled or not | "
-        "s at the bench |"
-    ]
-    lines += ["|---|---:|---:|---:|---:|---|---:|---:|"]
-    for arm, rows in found.items():
-        for count, row in enumerate(rows):
-            n = int(sum(row[state] for state in STATES))
-            low, high = wilson(int(row["right"]), n) if n else (0.0, 1.0)
-            cells = " | ".join(f"{row[state]:.0f}" for state in STATES)
-            lines.append(
-                f"| {arm} | {count} | {cells} | {low:.2f} to {high:.2f} | "
-                f"{row['leads']:.0f} | {row['seconds']:.0f} |"
-            )
-    return "\n".join(lines) + "\n"
+def highest(out: Path, names: Sequence[str]) -> list[float]:
+    """By case: highest pressure of the runs that were asked for, as a share of the highest one
+    that was recorded before; a run is planned to at most 1.05.
+    """
+    found = []
+    for name in names:
+        runs = sorted((out / "work" / name / "campaign").glob("step_*/recording_*.csv"))
+        most = [_most(file) for file in (out / "cases" / name / f"{FREE}.csv", *runs)]
+        found += [max(most[1:]) / most[0]] if runs else []
+    return found
 
 
-def draw(found: dict[str, list[dict[str, float]]], file: Path) -> None:
+def _most(log: Path) -> float:
+    """Highest muscle pressure of a log, in its own unit."""
+    head, *rows = log.read_text(encoding="utf-8").splitlines()
+    at = next(k for k, cell in enumerate(head.split(",")) if cell.startswith("muscle_pressure"))
+    return max(float(cell) for row in rows if (cell := row.split(",")[at]))
+
+
+def page(found: dict[str, list[dict[str, Any]]], cases: int, ratios: Sequence[float] = ()) -> str:
+    """The scores as tables, with how far pressures of the campaign went above what was recorded."""
+    states = rows_of(
+        ("arm", "runs", *STATES, "right, 95 %", "d >= 4: right", "wrong", "s at the bench"),
+        [
+            (arm, str(count), *(str(row[state]) for state in STATES), _interval(row))
+            + (_share(row["decidable"]), _share(row["decidable wrong"]), f"{row['seconds']:.0f}")
+            for arm, rows in found.items()
+            for count, row in enumerate(rows)
+        ],
+    )
+    columns = (*_MARKS, "intervals")
+    marks = rows_of(
+        ("arm", "runs", *columns),
+        [
+            (arm, str(count), *(_share(row[column]) for column in columns))
+            for arm, rows in found.items()
+            for count, row in enumerate(rows)
+        ],
+    )
+    over = f"{max(ratios):.2f}" if ratios else "none"
+    broken = sum(ratio > _BROKEN for ratio in ratios)
+    text = (
+        "Highest pressure of the runs of a campaign, as a share of the highest one recorded "
+        f"before: {over}; above {_BROKEN:g} in {broken} of {len(ratios)} cases."
+    )
+    return f"# Campaigns on the independent plant, {cases} cases\n\n{states}\n\n{marks}\n\n{text}\n"
+
+
+def _share(counts: tuple[int, int]) -> str:
+    return f"{counts[0]}/{counts[1]}"
+
+
+def _interval(row: dict[str, Any]) -> str:
+    """Share of the cases that are right, as an interval of 95 %."""
+    low, high = wilson(row["right"], max(1, sum(row[state] for state in STATES)))
+    return f"{low:.2f} to {high:.2f}"
+
+
+def draw(found: dict[str, list[dict[str, Any]]], file: Path) -> None:
     """Shares that are right, and wrong, over the runs, as SVG."""
     import matplotlib as mpl
     from matplotlib.figure import Figure

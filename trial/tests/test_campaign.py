@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 
 from trial import campaign
-from trial.campaign import ARMS, RUNS, _Case, is_right, page, scored, specs_of_campaigns, state_of
+from trial.campaign import (
+    ARMS,
+    RUNS,
+    _Case,
+    highest,
+    is_right,
+    page,
+    scored,
+    specs_of_campaigns,
+    state_of,
+)
 
 
 def test_a_case_of_a_seed_is_the_same_however_many_are_made():
@@ -20,14 +30,20 @@ def test_a_case_of_a_seed_is_the_same_however_many_are_made():
 
 
 def key(effects=(), wrong=(), verdict="effects", mark="known"):
-    told = [{"id": name, "mark": mark, "block": "chamber"} for name in effects]
+    told = [
+        {"id": name, "mark": mark, "block": "chamber", "form": "a", "first_catalogue": True}
+        | {"reached": 10.0, "catalogue_parameters": {}, "wanted": 10.0, "parameters": {}}
+        for name in effects
+    ]
+    lab = {"rate": 100, "bits": 12, "dropouts": False, "missing": "", "one": True}
     return {
+        "case": "a",
         "verdict": verdict,
         "effects": told,
         "wrong_parameters": dict.fromkeys(wrong, {"nominal": 1.0, "value": 2.0}),
         "terms": [],
         "model_error": {"percent": 0, "sizes": {}},
-        "spec": {"percent": 0, "stated": False},
+        "spec": {"percent": 0, "stated": False, "rig": "shoulder", "lab": lab},
     }
 
 
@@ -37,6 +53,7 @@ def result(*effects, verdict="effects", wrong=(), settled=True):
         "effects": [{"id": name} for name in effects],
         "wrong_parameters": [{"name": name} for name in wrong],
         "answer": {"settled": settled},
+        "limits": [{"effect": name, "distance": 6.0, "left": 10.0} for name in effects],
     }
 
 
@@ -91,8 +108,23 @@ def test_what_is_there_is_scored_and_the_page_has_every_arm(tmp_path):
                 (tmp_path / "results" / name / f"{arm}_{count}.json").write_text(told)
     found = scored(tmp_path, ["a", "b"])
     last = found["campaign"][-1]
-    assert (last["right"], last["open"], last["leads"], last["seconds"]) == (1, 1, 2, 90.0)
+    assert (last["right"], last["open"], last["seconds"]) == (1, 1, 90.0)
+    assert (last["first names"], last["wrong values"]) == ((2, 2), (0, 0))
+    # the limits say by how much the nearest rival is off, in proportion to what the effect leaves
+    assert (last["decidable"], last["decidable wrong"]) == ((1, 2), (0, 2))
     assert math.isnan(found["standard"][0]["seconds"])
-    assert "| campaign | 3 | 1 | 0 | 1 |" in page(found, 2)
+    told = page(found, 2, [1.04, 1.2])
+    assert "| campaign | 3 | 1 | 0 | 1 | 0.09 to 0.91 | 1/2 | 0/2 | 90 |" in told
+    assert "recorded before: 1.20; above 1.1 in 1 of 2 cases" in told
     campaign.draw(found, tmp_path / "curve.svg")
     assert "campaign, right" in (tmp_path / "curve.svg").read_text()
+
+
+def test_the_highest_pressure_of_a_run_is_a_share_of_that_before(tmp_path):
+    step = tmp_path / "work" / "a" / "campaign" / "step_01"
+    for folder, bar in ((tmp_path / "cases" / "a", (1.0, 4.0)), (step, (2.0, 5.0))):
+        folder.mkdir(parents=True)
+        rows = "".join(f"{k},{value}\n" for k, value in enumerate(bar))
+        name = "free_log.csv" if folder is not step else "recording_1.csv"
+        (folder / name).write_text("time [s],muscle_pressure [bar]\n" + rows)
+    assert highest(tmp_path, ["a"]) == [1.25]
