@@ -16,7 +16,7 @@ Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
 _RIDGE: Final = 1e-12
-"""What is added to the diagonal, as a part of it: more than the rounding of the sums, far less than
+"""Share of the diagonal that is added to it: more than the rounding of the sums, far less than
 anything that data tell."""
 
 

@@ -32,7 +32,7 @@ MOST_SIZE: Final = 1e150
 MOST_NAME: Final = 200
 """Characters of a name."""
 _MADE: Final = ("/proc", "/sys")
-"""Where the system makes files as they are read, without an end or a size."""
+"""Folders in which the system makes files as they are read, without an end or a size."""
 _KINDS: Final = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),

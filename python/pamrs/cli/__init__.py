@@ -42,7 +42,7 @@ NOT_WRITTEN: Final = 4
 _MOST_SHOWN: Final = 1500
 """Characters of an error's message that are shown: less than a screen."""
 _TYPER_INTERRUPTED: Final = 130
-"""What typer makes of an interrupt, in its newer versions."""
+"""Exit code of typer after an interrupt, in its newer versions."""
 
 app = typer.Typer(
     name="pamrs",

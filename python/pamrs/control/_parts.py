@@ -18,7 +18,7 @@ from pamrs.control._sampled import SampledController, Stateful
 from pamrs.control._values import as_value, positive_number
 
 ANTI_WINDUP: Final = ("clamping", "back_calculation", "none")
-"""How an integral is kept from growing while the output is at a limit; ``none`` as in the
+"""Ways to keep an integral from growing while the output is at a limit; ``none`` as in the
 dissertation."""
 
 

@@ -34,7 +34,7 @@ class Demand(NamedTuple):
     torque: Value
     """That of the drive at the angle [N m]."""
     angle: Value
-    """Where the torque is wanted [rad]."""
+    """Angle of the joint at which the torque is wanted [rad]."""
     pressures: tuple[Value, ...]
     """Of the groups' chambers, gauge, as measured [Pa]."""
     supplies: tuple[Value, ...]

@@ -100,7 +100,7 @@ EFFECTS: Final[dict[str, EffectInfo]] = {
 CATALOGUE: Final[dict[str, EffectInfo]] = {
     name: effect for name, effect in EFFECTS.items() if effect.catalogue
 }
-"""Those that a diagnosis may name."""
+"""Effects that a diagnosis may name."""
 CLOSURE_TERMS: Final[dict[str, tuple[ClosureTerm, ...]]] = {
     name: effect.terms for name, effect in EFFECTS.items() if effect.terms
 }
@@ -113,7 +113,7 @@ WORDS: Final[dict[str, Words]] = {
     name: Words(*(_words(name)[key] for key in ("what", "letter", "symbols", "odd_in")))
     for name in CLOSURE_TERMS
 }
-"""How each sum of terms is put into words."""
+"""Words for each sum of terms."""
 MEMORY_OF: Final[dict[str, str]] = {"time": "memory_time", "distance": "memory_angle"}
 """Shape that a term of a kind with memory depends on."""
 

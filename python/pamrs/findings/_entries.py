@@ -13,7 +13,7 @@ VERDICTS: Final = ("none", "parameters", "effects", "unlisted", "units")
 HEALTHY: Final = VERDICTS[:2]
 """Verdicts, and hypotheses, by which no physics is missing."""
 NOT_JUDGED: Final = "not_judged"
-"""What stands in the place of a verdict for a block that these recordings cannot judge."""
+"""Entry in place of a verdict for a block that these recordings cannot judge."""
 
 
 @dataclass(frozen=True, eq=False)

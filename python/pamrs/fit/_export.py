@@ -22,7 +22,7 @@ _NUMBERS: Final = (
     *("errors", "ndata", "nvarys", "chisqr", "redchi", "aic", "aicc", "bic", "rsquared"),
     *("condition_number", "rms_error", "max_error"),
 )
-"""What :func:`to_dict` has of a fit as it is."""
+"""Attributes of a fit that :func:`to_dict` takes as they are."""
 
 
 def fit_report(fit: MuscleFit) -> str:

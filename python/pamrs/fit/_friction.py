@@ -383,7 +383,7 @@ _NO_WAY: Final = (
     "direction (-1 or 'contracting', 1 or 'lengthening'), or the rows in the order measured, over "
     "length and back at each pressure or over pressure and back at each length"
 )
-"""What a map without directions needs."""
+"""Request for a map with directions."""
 
 
 def _isometric_levels(data: ForceMap, held: list[Index]) -> tuple[list[FrictionLevel], list[str]]:

@@ -20,7 +20,7 @@ from pamrs.errors import RecordingError
 _NUMBER: Final = 8
 """Bytes of a number as it is kept."""
 _DENSEST: Final = 100
-"""How many times smaller numbers become when they are packed, at most."""
+"""Factor by which numbers become smaller when they are packed, at most."""
 
 
 def check_size(rows: int, cells: int, source: str, columns: int = 0) -> None:

@@ -306,7 +306,7 @@ _VOLTAGES: Final = (
 )
 _ABSOLUTE: Final = frozenset(("abs", "absolute", "absolut"))
 _READINGS: Final[dict[str, tuple[float, ...]]] = {"A": (4.0, 20.0), "V": (0.0, 10.0)}
-"""What transmitters give, from the lower end of their range to the upper one."""
+"""Signals of usual transmitters, from the lower end of their range to the upper one."""
 
 
 def _usual_unit(channel: str) -> str:

@@ -63,7 +63,7 @@ ELSEWHERE = {
     "supply": ("line", "chamber"),
     "muscle": ("chamber",),
 }
-"""Where something of a block is drawn that the rig has not, or that has no box of its own."""
+"""Boxes in which a block is drawn that the rig has not, or that has no box of its own."""
 
 
 @dataclass(eq=False)

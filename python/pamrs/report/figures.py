@@ -92,7 +92,7 @@ STYLE: Any = {
 }
 """Matplotlib settings of every figure."""
 _SMALL: Any = {"font.size": 8.5, "legend.fontsize": 8.0, "axes.labelsize": 8.5}
-"""Those of a summary that are others."""
+"""Settings of the summary that differ from them."""
 
 
 def _rms(values: Array | None) -> float:

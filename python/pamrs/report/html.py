@@ -43,7 +43,7 @@ _BADGES = {
 """Verdicts in a few words, settled and not settled; ``wrong`` is ``parameters`` where a value is
 named."""
 _MORE = ("not settled: what is missing was not found", "not settled: more is missing")
-"""The same where the final model still misses too much: without a name, and with one."""
+"""Verdicts where the final model still misses too much: without a name, and with one."""
 
 
 def _badge(verdict: str, named: Sequence[str], *, settled: bool) -> str:
@@ -206,7 +206,7 @@ _LEFT = {
     "noise": "left, no more than noise",
     "error": "left, inside the usual error of the model",
 }
-"""What is left of a block's budget, where it is nothing unexplained."""
+"""Words for the rest of a block's budget, where it is nothing unexplained."""
 
 
 def _budget(diagnosis: Findings) -> list[tuple[str, list[dict[str, str]]]]:

@@ -45,10 +45,10 @@ _LABELS = {
 }
 
 TELLING = 0.25
-"""How far below nothing or above everything a share is still told by itself."""
+"""Distance below nothing or above everything within which a share is told as a number."""
 
 FARTHEST = 3.0
-"""How large an end of a share's interval is still told as a number."""
+"""Largest end of a share's interval that is told as a number."""
 
 BUDGET_NOTE = (
     "Shares are of the variance that the nominal model leaves beyond the noise; all values are "
@@ -56,7 +56,7 @@ BUDGET_NOTE = (
     "to the squares of what each changes in the prediction. A share below 0 % makes the "
     "prediction worse; others are then above 100 %."
 )
-"""What the shares of a budget are."""
+"""Explanation of the shares of a budget."""
 
 _INSTRUCTION = 40
 """Characters that two texts share at least before they are said to begin with one instruction."""
@@ -706,7 +706,7 @@ def _answer(names: list[str], chance: float = math.nan) -> str:
 
 
 DOWN_TO_NOISE = "down to the noise level"
-"""How closely a model explains recordings of which only noise is left."""
+"""Words for a model that leaves only noise of its recordings."""
 
 
 def down_to(diagnosis: Findings) -> str:
@@ -800,7 +800,7 @@ _LEFT = {
     "noise": "only noise is left",
     "error": "what is left is inside the usual error of the model",
 }
-"""What is said of what a block keeps, where it is nothing unexplained."""
+"""Sentences on the rest of a block, where it is nothing unexplained."""
 
 
 def budget_sentences(diagnosis: Findings) -> list[tuple[str, str]]:

@@ -78,7 +78,7 @@ class Parameter:
 
 _DAY: Final = 86400.0  # [s]
 _COMPARED: Final = ("name", "_model", "_tolerances", "_effect_std")
-"""What rigs that are equal have alike; where they were read from, and comments, may differ."""
+"""Attributes that equal rigs have alike; the file they were read from, and comments, may differ."""
 
 
 @dataclass(frozen=True, eq=False)

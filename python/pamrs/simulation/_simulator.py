@@ -81,7 +81,7 @@ class Simulator:
         self._initial = initial_values(initial, rig)
         self._inputs = inputs_of(rig)
         self.events: list[Event] = []
-        """What happened since the start or the last :meth:`reset` or :meth:`restore`, see
+        """Events since the start or the last :meth:`reset` or :meth:`restore`, see
         :class:`pamrs.simulation.Event`."""
         self._core = self._started(self._initial)
 
