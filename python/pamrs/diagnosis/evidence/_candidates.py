@@ -63,6 +63,8 @@ _MOST_WEIGHTINGS = 4
 _SCATTER_STDS = 2.0
 # share of the nominal stable step below which no events are sought: too slow (decision 103)
 _LEAST_STEP_SHARE = 0.2
+_MOST_TURNS = 3  # in which events and the effects beside them are fitted in turn
+_LEAST_TURN = 0.8  # share of the sum of squares above which a further turn is not worth it
 _EVALUATIONS_BESIDE = 6  # evaluations of the fit of persistent effects beside events that are held
 _FIRST_EVALUATIONS = 5  # evaluations of such a fit (decision 13)
 # evaluations of a freed parameter's first fit: is it worth a whole one (decision 25)
@@ -292,7 +294,7 @@ class Attempts:
         if fitted is None:
             return None
         if beside.effects:
-            fitted = self._refit_around_events(fitted, beside, white)
+            fitted = self._fit_in_turn(fitted, beside, white)
         effects = (*beside.effects, effect)
         if self.same:
             return self.judge(effects, fitted)
@@ -311,6 +313,29 @@ class Attempts:
             ),
         )
         return self.judge(effects, everywhere, residuals(self.outer, bare, events=events))
+
+    def _fit_in_turn(
+        self, fitted: Fit, beside: FittedHypothesis, autocorrelation: dict[str, float]
+    ) -> Fit:
+        """Refit the persistent effects of a candidate beside its events, then look for the events
+        anew beside these, as long as either leaves much less: effects that were fitted without the
+        events had followed them.
+        """
+        last = self._refit_around_events(fitted, beside, autocorrelation)
+        for _ in range(_MOST_TURNS):
+            assert last.events is not None
+            bare = without_term(last.rig, last.events.effect)
+            model = with_effects_of(self.nominal, bare, self.held)
+            found = residuals(self.inner, bare, list(beside.fit.moved))
+            known = replace(last, effects=beside.effects, rig=bare, residuals=found, events=None)
+            again = fit_events(last.events.effect, self.inner, model, known, autocorrelation)
+            if again is None:
+                return last
+            before = last
+            last = self._refit_around_events(again, replace(beside, fit=known), autocorrelation)
+            if last.cost > _LEAST_TURN * before.cost:
+                return min(last, before, key=lambda one: one.cost)
+        return last
 
     def _refit_around_events(
         self, fitted: Fit, beside: FittedHypothesis, autocorrelation: dict[str, float]

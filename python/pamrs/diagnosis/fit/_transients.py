@@ -131,7 +131,8 @@ def fit_events(
     Returns
     -------
     Fit or None
-        With ``events``; its ``values`` hold the parameters of the first recording that has one.
+        With ``events``; its ``values`` hold the parameters of the recording that tells most of its
+        event, which comes first.
         None where nothing was found.
     """
     rig, base = baseline.rig, baseline.residuals
@@ -476,14 +477,23 @@ def _fit_jointly(
     wide = pieces_spread(
         values[:measured], jacobian[:measured], covariance, pieces_of(problem, by_block)
     )
-    spread = np.maximum(wide, np.sqrt(np.clip(np.diag(covariance), 0.0, None)))
-    std_of = {
-        place: float(s)
-        for place, s in zip(vector.places, spread[count:] * vector.scale, strict=True)
-    }
-    first = next(iter(events.values))
+    alone = np.sqrt(np.clip(np.diag(covariance), 0.0, None))[count:]
+    # one piece or two tell of an event of one recording: their disagreement is no measure of it
+    every = np.array([not name for name, _ in vector.places])
+    spread = np.where(every, np.maximum(wide[count:], alone), alone)
+    std_of = dict(zip(vector.places, (spread * vector.scale).tolist(), strict=True))
+    found = vector.events_at(x)
+
+    def vagueness(name: str) -> float:
+        own = [s for (place, _), s in zip(vector.places, spread, strict=True) if place == name]
+        return float(max(own, default=0.0))
+
+    # the recording that tells most of its event stands for all
+    in_order = sorted(found.values, key=vagueness)
+    found = replace(found, values={name: found.values[name] for name in in_order})
     event_std = {
-        p: std_of.get((first, p), std_of.get(("", p), math.nan)) for p in events.values[first]
+        p: std_of.get((in_order[0], p), std_of.get(("", p), math.nan))
+        for p in found.values[in_order[0]]
     }
     names, scaling = vector.names, vector.scaling
     return replace(
@@ -497,7 +507,7 @@ def _fit_jointly(
         residuals=by_block,
         moved={n: float(v) for n, v in zip(names, x[:count], strict=True)},
         evaluations=spent,
-        events=vector.events_at(x),
+        events=found,
     )
 
 
