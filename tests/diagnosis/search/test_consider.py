@@ -43,11 +43,15 @@ def test_each_suspicion_has_its_share_and_its_probability(asked: pamrs.Diagnosis
 
 @pytest.mark.slow
 def test_what_cannot_be_fitted_together_is_said() -> None:
-    """Two effects that happen at times of their own, and one beside a wrong value."""
+    """An effect that happens at times of its own beside a wrong value, and beside another one."""
     given = again.case(RIG.with_effect("payload_change", {"mass_change": 2.0, "time": 4.0}), RIG)
     asked = ["payload_change+external_torque", "payload_change+arm.payload"]
     found = pamrs.diagnose(given, consider=asked)
-    assert [own.left for own in found.considered] == [None, None]
+    both, with_value = found.considered
+    assert (with_value.left, with_value.probability) == (None, 0.0)
+    # a push takes nothing that the change of the payload leaves
+    assert both.left == pytest.approx(0.0, abs=0.02)
+    assert both.probability < 0.1
     assert "it happens with another event or a wrong value" in found.summary()
 
 
