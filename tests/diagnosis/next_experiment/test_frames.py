@@ -31,7 +31,7 @@ from tests.diagnosis.frames import BENCH, PAIR, REGULATED, REST, VALVED
 
 HOME = Path(__file__).parents[3]
 OPEN = {
-    "muscle_hysteresis": {"friction_constant": 2.0, "friction_pressure": 0.0, "presliding": 3e-3},
+    "muscle_hysteresis": {"friction_constant": 1.4, "friction_pressure": 0.0, "presliding": 3e-3},
     "muscle_creep": {"stiffness": 300.0},
 }
 """Effects that small strokes at one speed do not tell apart."""
@@ -66,8 +66,8 @@ def test_what_small_strokes_leave_open_is_settled_by_what_is_proposed(effect, st
     pair = next(p for p in told.pairs if set(p.between) == set(OPEN))
     assert pair.experiment
     assert "mm" in pair.text
-    other = next(p for p in told.pairs if "unlisted" in p.between)
-    assert other.experiment == "nested_strokes"
+    others = [p for p in told.pairs if "unlisted" in p.between]
+    assert all(p.experiment == "nested_strokes" for p in others)
     protocol = told.protocol
     assert protocol is not None
     assert protocol.units == {"pressure_command": "Pa", "length": "m"}
