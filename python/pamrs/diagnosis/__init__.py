@@ -94,7 +94,7 @@ def _unknown_parameters(rig: Rig) -> list[str]:
     return [name for name in unknown if channel_of(name) in moving]
 
 
-def _capped(group: BlockGroup, factor: float) -> BlockGroup:
+def _scaled_for_unknown_geometry(group: BlockGroup, factor: float) -> BlockGroup:
     """Scale down all names in a group of moving blocks; ``unlisted`` gets the rest."""
     if group.mismatch is None or not group.mismatch.mechanical:
         return group
@@ -242,7 +242,7 @@ def _answer_without_unfollowed(
 ) -> tuple[Diagnosis, Ready]:
     """Diagnose a case without recordings that its model cannot follow; return that case too."""
     try:
-        return _diagnose_ready(ready, settings, considered, say), ready
+        return _diagnosis_of_ready_case(ready, settings, considered, say), ready
     except Unfollowed as error:
         unfollowed = error
     why = f"the model cannot follow it ({unfollowed})"
@@ -253,10 +253,12 @@ def _answer_without_unfollowed(
     return _answer_without_unfollowed(rest, settings, considered, say)
 
 
-def _diagnose_ready(
+def _diagnosis_of_ready_case(
     ready: Ready, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...], say: Steps
 ) -> Diagnosis:
-    """Diagnose a case that passed the checks before any fit."""
+    """Diagnosis of a case that passed the checks before any fit: as one of another unit where one
+    explains what the model misses, else of its physics.
+    """
     case = ready.case
     shortened, counts = averaged_to_need(case.recordings, ready.blocks, case.name, settings)
     case = replace(case, recordings=shortened)
@@ -274,7 +276,7 @@ def _diagnose_ready(
             "the search for offsets of commands", lambda: _with_offsets(inner, outer, case.rig)
         )
         inner, outer, moved = shifted or (inner, outer, [])
-        stated, judged, unjudged = _diagnose_physics(case, inner, outer, unjudged, say)
+        stated, judged, unjudged = _diagnosis_in_units_said(case, inner, outer, unjudged, say)
         what = "the look at other laws of the rig"
         diagnosis = inner.losses.part(
             what, lambda: _under_best_law(case, considered, inner, stated), stated
@@ -316,10 +318,12 @@ def _case_with_own_model(case: Any, data: Any, *, allow_outside: bool) -> Case:
     return case if isinstance(case, Case) else load_case(case, allow_outside=allow_outside)
 
 
-def _diagnose_physics(
+def _diagnosis_in_units_said(
     case: Case, inner: Problem, outer: Problem, unjudged: list[Unjudged], say: Steps
 ) -> tuple[Diagnosis, Problem, list[Unjudged]]:
-    """Diagnose physics: the result, recordings with judged blocks, and unjudged blocks."""
+    """Diagnosis once no wrong unit was found; with it the recordings with the blocks that were
+    judged, and those that were not.
+    """
     every = inner.blocks
     motion = [b for b in inner.blocks if b.mechanical]
     parts = [[b for b in inner.blocks if not b.mechanical], motion]
@@ -331,7 +335,7 @@ def _diagnose_physics(
     )
     unsettled = _unknown_parameters(case.rig) if motion else []
     if unsettled:
-        groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
+        groups = [_scaled_for_unknown_geometry(g, _UNKNOWN_GEOMETRY_PROBABILITY) for g in groups]
     say("putting the answer together", _JUDGED[1])
     judged_names, failed = {block.name for block in inner.blocks}, "its judgement failed"
     unjudged += [Unjudged(b.name, b.covers, failed) for b in every if b.name not in judged_names]
@@ -390,7 +394,7 @@ def _under_best_law(
     best, quiet = stated, Steps(None, within=_JUDGED)
     for choice, recordings in promising_laws(case.rig, inner, stated, divided):
         with suppress(PamrsError):  # a rig that these recordings cannot be of
-            other, _, _ = _diagnose_physics(case.with_rig(choice.rig), *recordings, quiet)
+            other, _, _ = _diagnosis_in_units_said(case.with_rig(choice.rig), *recordings, quiet)
             best = under(choice, other, stated) if is_better(other, best) else best
     return best
 

@@ -13,7 +13,7 @@ import pytest
 import pamrs
 from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, possible_gain, weigh
 from pamrs.diagnosis.evidence._likelihood import _Covariance
-from pamrs.diagnosis.evidence._verdicts import _capped
+from pamrs.diagnosis.evidence._verdicts import _with_capped_names
 from pamrs.diagnosis.evidence._weighing import loss_by_values
 from pamrs.diagnosis.fit import Events, Fit, Problem, Start, fits
 from pamrs.diagnosis.noise import Excess
@@ -152,11 +152,11 @@ def test_what_follows_a_curve_of_the_model_is_not_left_by_a_name() -> None:
 def test_names_that_groups_agree_on_are_capped() -> None:
     most = SETTINGS.most_probability
     own = {Hypothesis(terms("muscle_creep")): 50.0, UNLISTED: 0.1, NONE: 0.1}
-    found = _capped(own, most)
+    found = _with_capped_names(own, most)
     assert sum(found.values()) == pytest.approx(sum(own.values()))
     assert found[Hypothesis(terms("muscle_creep"))] == pytest.approx(most * 50.2)
     unsure = {Hypothesis(terms("muscle_creep")): 0.5, UNLISTED: 0.5}
-    assert _capped(unsure, most) == unsure
+    assert _with_capped_names(unsure, most) == unsure
 
 
 def test_a_second_name_pays_for_itself_or_is_not_believed() -> None:

@@ -342,4 +342,4 @@ def test_a_name_that_predicts_its_block_worse_than_the_rig_file_is_put_aside() -
     assert blamed(800.0, 898.0) == {0}
     assert blamed(800.0, 810.0) == set()  # no more than chance
     assert blamed(800.0, 790.0) == set()
-    assert _conclude._without_name(own, judged).probabilities == {UNLISTED: 1.0}
+    assert _conclude._without_addition(own, judged).probabilities == {UNLISTED: 1.0}

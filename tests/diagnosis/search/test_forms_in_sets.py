@@ -43,7 +43,7 @@ def hurried(trial: Attempts, evaluations: int) -> FittedHypothesis:
     held = {name: value for start in starts for name, value in start.held.items()}
     effects = tuple(start.effect for start in starts)
     found = fit(trial.inner, RIG, effects, free, trial.white, fixed=held, evaluations=evaluations)
-    return trial.judge(effects, found)
+    return trial.assess(effects, found)
 
 
 def test_a_set_ends_weighted_by_what_it_leaves(trial: Attempts) -> None:

@@ -3,10 +3,10 @@
 Public: `FittedHypothesis`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_out`,
 `autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
 `BlockLikelihood` (how probable recordings are);
-`weigh`, `explains`, `is_absent`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
-`possible_gain`, `prior_loss`, `Weighing` (their weights); `drop_undetermined`, `with_stated_std`,
-`is_outside`, `put_aside` (names that do not hold); `Judged`, `judge`, `case_probabilities`,
-`case_ambiguity`, `is_unlikely`, `parameters_at_wall` (verdicts).
+`weigh`, `explains`, `is_absent`, `log_weight`, `LEAST_TEMPERING`, `share_left`, `same_recordings`,
+`probability_cap`, `possible_gain`, `prior_loss`, `Weighing` (their weights); `drop_undetermined`,
+`with_stated_std`, `is_outside`, `put_aside` (names that do not hold); `Judged`, `judge`,
+`case_probabilities`, `case_ambiguity`, `is_unlikely`, `parameters_at_wall` (verdicts).
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ from pamrs.diagnosis.evidence._verdicts import (
 )
 from pamrs.diagnosis.evidence._weighing import (
     FORM_SHARE_ALIKE,
+    LEAST_TEMPERING,
     Weighing,
     explains,
     is_absent,
@@ -58,6 +59,7 @@ __all__ = [
     "SHARED_ODDS",
     "WALL_TOLERANCES",
     "FORM_SHARE_ALIKE",
+    "LEAST_TEMPERING",
     "Attempts",
     "BlockLikelihood",
     "FittedHypothesis",

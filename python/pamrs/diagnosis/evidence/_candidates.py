@@ -1,4 +1,4 @@
-"""Candidates: hypotheses fitted to recordings, and judged on those that were held out."""
+"""Candidates: hypotheses fitted to recordings, and what they leave of those that were held out."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class FittedHypothesis:
     fit : Fit
         On the recordings to fit.
     held_out : dict of str to Excess
-        By block, on held-out recordings (on the fitted ones if there are no others).
+        By block, on held-out recordings; without any, on each recording as predicted by the others.
     fitted : dict of str to Excess
         By block, on the recordings to fit.
     gap_closed : float
@@ -213,7 +213,7 @@ def misses_only_held_out(
 
 @dataclass(frozen=True, eq=False)
 class Attempts:
-    """Fits of hypotheses to the recordings of one model, and their judgement as candidates."""
+    """Fits of hypotheses to the recordings of one model, and what these leave of them."""
 
     inner: Problem
     outer: Problem
@@ -253,7 +253,11 @@ class Attempts:
     def likelihood_of(
         self, inside: Mapping[Key, Residual], outside: Mapping[Key, Residual]
     ) -> Callable[[], Mapping[str, BlockLikelihood]]:
-        """Likelihood of a hypothesis's residuals by block, worked out when it is asked for."""
+        """Likelihood of a hypothesis's residuals by block, worked out when it is asked for.
+
+        Where no recording is held out it is that of the fitted residuals: what others predict of
+        each recording does not enter.
+        """
         residuals_of_all = inside if self.same else {**inside, **outside}
         return cache(partial(self.likelihood.of, residuals_of_all))
 
@@ -295,14 +299,14 @@ class Attempts:
             fitted = self._refit_around_events(fitted, beside, white)
         effects = (*beside.effects, effect)
         if self.same:
-            return self.judge(effects, fitted)
+            return self.assess(effects, fitted)
         bare = without_term(fitted.rig, effect)
         quiet = residuals(self.outer, bare)
         form = fitted.events.form if fitted.events else ""
         known = {n: fitted.values[f"{effect}.{n}"] for n in effect.info.form(form).shared}
         events = look_for_events(effect, self.outer, bare, quiet, white, known, form)
         if events is None:
-            return self.judge(effects, fitted, quiet)
+            return self.assess(effects, fitted, quiet)
         everywhere = replace(
             fitted,
             events=replace(
@@ -310,7 +314,7 @@ class Attempts:
                 values=fitted.events.values | events.values if fitted.events else events.values,
             ),
         )
-        return self.judge(effects, everywhere, residuals(self.outer, bare, events=events))
+        return self.assess(effects, everywhere, residuals(self.outer, bare, events=events))
 
     def _refit_around_events(
         self, fitted: Fit, beside: FittedHypothesis, autocorrelation: dict[str, float]
@@ -343,10 +347,12 @@ class Attempts:
         """Excess over the noise of a block's residual in the recordings of a problem."""
         return excess(block, problem.recordings, block_residuals, self.noise_level, self.settings)
 
-    def judge(
+    def assess(
         self, effects: tuple[Term, ...], fitted: Fit, outside: dict[Key, Residual] | None = None
     ) -> FittedHypothesis:
-        """Judge a fit on held-out recordings, or on each recording as the others predict it."""
+        """A fit with its excess over the noise, in the recordings that were fitted and in held-out
+        ones; without any, in each recording as the others predict it.
+        """
         blocks = self.inner.blocks
         inside = {b.name: self.excess(b, self.inner, fitted.residuals) for b in blocks}
         if outside is None:
@@ -393,15 +399,15 @@ class Attempts:
         settings, sealed = self.settings, self.nominal.model["valve"] is None
         limit = _SEALED_EVALUATIONS if sealed else settings.effect_evaluations
 
-        def fit_and_judge() -> FittedHypothesis:
+        def fit_and_assess() -> FittedHypothesis:
             best = self._fit(starts, autocorrelation, warm, evaluations=limit)
             weights = self.autocorrelation(best)
             if weights.largest > CORRELATED_VARIANCE:
                 again = [self.start_of(best, effect) for effect in effects]
                 best = self._fit(again, weights, best, evaluations=limit)
-            return self.judge(effects, best)
+            return self.assess(effects, best)
 
-        return self._attempt(effects, fit_and_judge)
+        return self._attempt(effects, fit_and_assess)
 
     def fit_shortly(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
@@ -413,11 +419,11 @@ class Attempts:
         if not self.held.isdisjoint(e.id for e in effects):
             return None
 
-        def fit_and_judge() -> FittedHypothesis:
+        def fit_and_assess() -> FittedHypothesis:
             short = self._fit(starts, self.white, warm, wrong=wrong, evaluations=_FIRST_EVALUATIONS)
-            return replace(self.judge(effects, short), wrong=wrong)
+            return replace(self.assess(effects, short), wrong=wrong)
 
-        return self._attempt((*effects, *wrong), fit_and_judge)
+        return self._attempt((*effects, *wrong), fit_and_assess)
 
     def _attempt(self, terms: Iterable[object], work: Callable[[], Found]) -> Found | None:
         """Run an attempt at a hypothesis; None where it leaves the model's range or fails."""
@@ -487,7 +493,7 @@ class Attempts:
         enough to see which of many are worth a whole fit.
         """
 
-        def fit_and_judge() -> FittedHypothesis:
+        def fit_and_assess() -> FittedHypothesis:
             short = fit(
                 self.inner,
                 self.nominal,
@@ -498,9 +504,9 @@ class Attempts:
                 freed=names,
                 evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
             )
-            return replace(self.judge((), short), wrong=names)
+            return replace(self.assess((), short), wrong=names)
 
-        return self._attempt(names, fit_and_judge)
+        return self._attempt(names, fit_and_assess)
 
     def fit_freed(
         self, names: tuple[str, ...], baseline: Fit, share: float | None = None
@@ -528,20 +534,20 @@ class Attempts:
                 share=least,
             )
 
-        def fit_and_judge(alone: bool) -> FittedHypothesis:
+        def fit_and_assess(alone: bool) -> FittedHypothesis:
             first = fitted(self.white, self._fit_alone(names) if alone else baseline)
             autocorrelation = self.autocorrelation(first)
             correlated = autocorrelation.largest > CORRELATED_VARIANCE
-            judged = self.judge((), fitted(autocorrelation, first) if correlated else first)
-            return replace(judged, wrong=names)
+            assessed = self.assess((), fitted(autocorrelation, first) if correlated else first)
+            return replace(assessed, wrong=names)
 
         best: FittedHypothesis | None = None
         for alone in (True, False):
-            judged = self._attempt(names, partial(fit_and_judge, alone))
-            if judged is None:
+            assessed = self._attempt(names, partial(fit_and_assess, alone))
+            if assessed is None:
                 continue
-            if best is None or judged.misfit < best.misfit:
-                best = judged
+            if best is None or assessed.misfit < best.misfit:
+                best = assessed
             if not any(significant(e) for e in best.fitted.values()):
                 break
         return best
@@ -580,7 +586,7 @@ class Attempts:
             if not self._lighter(weights_left, weights):
                 break
             weights, starts = weights_left, [self.start_of(fitted, effect) for effect in effects]
-        return replace(self.judge(effects, fitted), wrong=wrong)
+        return replace(self.assess(effects, fitted), wrong=wrong)
 
     def _lighter(self, weights_left: dict[str, float], weights: dict[str, float]) -> bool:
         """True where a fit leaves much less autocorrelation than it was weighted by."""

@@ -59,7 +59,7 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     """
     settings = problem.settings
     probabilities = dict(group.probabilities)
-    to = _without_name(group)
+    to = _nameless_answer(group)
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
         if len(candidate.terms) != 1 or chance < settings.in_set:
@@ -116,11 +116,11 @@ def put_aside(group: BlockGroup, hypothesis: Hypothesis) -> BlockGroup:
     if total > 0.0:
         probabilities = {h: p / total for h, p in probabilities.items()}
     else:
-        probabilities[_without_name(group)] = 1.0
+        probabilities[_nameless_answer(group)] = 1.0
     candidates = [c for c in group.candidates if c.hypothesis != hypothesis]
     return replace(group, candidates=candidates, probabilities=probabilities)
 
 
-def _without_name(group: BlockGroup) -> Hypothesis:
+def _nameless_answer(group: BlockGroup) -> Hypothesis:
     """Answer without a name: `UNDECIDED` where only noise is left, else `UNLISTED`."""
     return UNDECIDED if group.mismatch is None else UNLISTED

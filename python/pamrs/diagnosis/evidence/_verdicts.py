@@ -39,15 +39,16 @@ _ALIKE_SHARE = 0.5
 _LISTED = 1e-4
 _COUNTED = 1e-6  # probability from which a hypothesis of one group is put beside those of others
 _MOST_SETS = 8  # sets that a case lists
-# probability of parameters (none) in a group that keeps noise: the rest (decision 4)
+# `UNDECIDED` of a group of which only noise is left is divided by these numbers (decision 4):
+# most of it goes to parameters where these moved, else to none
 _QUIET_LIKELY = 0.83
-# probability of none where parameters moved, and the reverse (decision 4)
+# of none where parameters moved, of parameters where they did not
 _QUIET_OTHER = 0.03
-# probability of unlisted in such a group, too small to see: 24 of 171 groups (decision 4)
+# of unlisted: in 24 of 171 such groups physics was missing that was too small to be seen
 _QUIET_UNLISTED = 0.14
-# parameters with one at its wall: explained, at a price the owner would mind (decision 4)
+# of parameters where their values are unlikely: these explain all, at a price the owner would mind
 _STRAINED_PARAMETERS = 0.75
-_STRAINED_UNLISTED = 0.25  # probability of unlisted there (decision 4)
+_STRAINED_UNLISTED = 0.25  # of unlisted there
 # [tolerances] moved to its wall (fit.most_tolerances), which is suspect (decision 25)
 WALL_TOLERANCES = 2.9
 # [noise levels] left in a group below which nothing has no name: both such groups of 40 read cases
@@ -174,12 +175,14 @@ def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Jud
         for weights, (hypothesis, _) in zip(joint, choice, strict=True):
             weights[hypothesis] = weights.get(hypothesis, 0.0) + weight
     return [
-        _judged(group, _normalised(_capped(weights, settings.most_probability)), settings)
+        _with_verdict(
+            group, _normalised(_with_capped_names(weights, settings.most_probability)), settings
+        )
         for group, weights in zip(groups, joint, strict=True)
     ]
 
 
-def _capped(weights: dict[Hypothesis, float], most: float) -> dict[Hypothesis, float]:
+def _with_capped_names(weights: dict[Hypothesis, float], most: float) -> dict[Hypothesis, float]:
     """Cap the weights of all names together at a share of the total; `UNLISTED` gets the rest."""
     total = sum(weights.values())
     named = sum(w for h, w in weights.items() if h.terms)
@@ -246,10 +249,12 @@ def _normalised(weights: dict[Hypothesis, float]) -> dict[Hypothesis, float]:
     return dict(sorted(((h, w / total) for h, w in weights.items()), key=lambda item: -item[1]))
 
 
-def _judged(
+def _with_verdict(
     group: BlockGroup, probabilities: dict[Hypothesis, float], settings: DiagnosisSettings
 ) -> Judged:
-    """Judge a group by its likeliest hypothesis; unlisted only if no name exceeds ``named``."""
+    """A group with the verdict of its likeliest hypothesis; unlisted only if no name exceeds
+    ``named``.
+    """
     start = group.candidates[0]
     named = {h: p for h, p in probabilities.items() if h not in WITHOUT_NAME}
     healthy = max(_HEALTHY_HYPOTHESES, key=lambda h: probabilities.get(h, 0.0))

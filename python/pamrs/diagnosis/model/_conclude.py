@@ -258,7 +258,7 @@ def _sound_models(
         if not blamed and not any(missing.values()):
             return models, inside, outside
         groups = [
-            _without_name(group, models.judged[k])
+            _without_addition(group, models.judged[k])
             if k in blamed
             else _with_mismatch(group, missing[k])
             for k, group in enumerate(groups)
@@ -275,7 +275,7 @@ def _needless(models: Models, settings: DiagnosisSettings) -> set[int]:
     }
 
 
-def _without_name(group: BlockGroup, judged: Judged) -> BlockGroup:
+def _without_addition(group: BlockGroup, judged: Judged) -> BlockGroup:
     """Group without what it adds to the model: its name, or the form of what has none."""
     if judged.added:
         return put_aside(group, judged.chosen.hypothesis)

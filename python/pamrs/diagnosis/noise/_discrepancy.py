@@ -101,8 +101,8 @@ def curves(
     prepared : Prepared
         The recording.
     ranges : dict
-        As of `visited`: over these a curve runs, so that column k is one and the same curve in
-        every recording.
+        As of `operating_ranges`: over these a curve runs, so that column k is one and the same
+        curve in every recording.
     stated : dict
         The model's error as the rig file states it (:attr:`pamrs.Rig.model_error`).
     width : int

@@ -825,13 +825,13 @@ def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGro
     if closed is None:
         return group
     try:
-        judged = trial.judge(closed.effects, closed)
+        assessed = trial.assess(closed.effects, closed)
     except SimulationError:
         return group
     # what does not carry over to recordings that were held out is no form of anything
-    if share_left(judged, start, suspects) > _MOST_SHARE_LEFT:
+    if share_left(assessed, start, suspects) > _MOST_SHARE_LEFT:
         return group
-    return replace(group, closure=judged)
+    return replace(group, closure=assessed)
 
 
 def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> list[BlockGroup]:

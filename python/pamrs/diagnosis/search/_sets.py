@@ -12,6 +12,7 @@ import numpy as np
 
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
+    LEAST_TEMPERING,
     Attempts,
     FittedHypothesis,
     Weighing,
@@ -82,7 +83,11 @@ class Search:
 
     def weight(self, candidate: FittedHypothesis) -> float:
         """Logarithm of what a hypothesis weighs against others."""
-        return log_weight(candidate, self.start, self.trial.compared, self.weighing)
+        # that of `weigh` depends on the best hypothesis of all, which is not found yet: by a fixed
+        # one the order of those that are known stays as it is when others come
+        return log_weight(
+            candidate, self.start, self.trial.compared, self.weighing, LEAST_TEMPERING
+        )
 
     def share_left(self, candidate: FittedHypothesis) -> float:
         """Share of the mismatch that a hypothesis leaves."""
