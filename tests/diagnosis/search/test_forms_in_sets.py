@@ -42,14 +42,16 @@ def hurried(trial: Attempts, evaluations: int) -> FittedHypothesis:
     free = {name: value for start in starts for name, value in start.free.items()}
     held = {name: value for start in starts for name, value in start.held.items()}
     effects = tuple(start.effect for start in starts)
-    found = fit(trial.inner, RIG, effects, free, trial.white, fixed=held, evaluations=evaluations)
+    found = fit(
+        trial.inner, RIG, effects, free, trial.no_inflation, fixed=held, evaluations=evaluations
+    )
     return trial.assess(effects, found)
 
 
 def test_a_set_ends_weighted_by_what_it_leaves(trial: Attempts) -> None:
     begun = hurried(trial, 1)
     ended = trial.polish(begun)
-    first, last = trial.autocorrelation(begun.fit), trial.autocorrelation(ended.fit)
+    first, last = trial.inflation_of(begun.fit), trial.inflation_of(ended.fit)
     for block, left in last.items():
         assert first[block] > 10.0 * left  # it left far more where it began
         assert ended.fit.inflation[block] <= 2.0 * left
@@ -58,9 +60,9 @@ def test_a_set_ends_weighted_by_what_it_leaves(trial: Attempts) -> None:
 def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(trial: Attempts) -> None:
     base = hurried(trial, 20)
     assert any(significant(kept) for kept in base.fitted.values())
-    start = fit(trial.inner, RIG, (), {}, trial.white)
+    start = fit(trial.inner, RIG, (), {}, trial.no_inflation)
     both = list(terms("leak_muscle", "heat_transfer"))
-    screened = screen(trial.inner, start, both, trial.white, sealed=True)
+    screened = screen(trial.inner, start, both, trial.no_inflation, sealed=True)
     told: list[str] = []
     search = Search(trial, screened, base, Weighing(0.985, 60.0, SETTINGS), told.append)
     found = in_best_forms(search, base)

@@ -105,14 +105,14 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
 def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     true = RIG.with_parameters({"arm.payload": 0.7 * 9.07})
     problem = problem_of(RIG, [recorded(true, "fit", 1, seconds=12.0)], "arm")
-    white = {"arm": 1.0}
-    baseline = fit(problem, RIG, (), {}, white, evaluations=20)
+    no_inflation = {"arm": 1.0}
+    baseline = fit(problem, RIG, (), {}, no_inflation, evaluations=20)
     found = suspected_values(baseline, problem.blocks)
     assert ("arm.payload",) in found
     assert ("arm.payload", "arm.first_moment") in found
     assert all(abs(baseline.moved[name]) <= 3.0 + 1e-9 for name in baseline.moved)
     more = {"freed": ["arm.payload"], "warm": baseline, "evaluations": 30, "share": 1e-5}
-    loose = fit(problem, RIG, (), {}, white, **more)
+    loose = fit(problem, RIG, (), {}, no_inflation, **more)
     assert loose.freed == ("arm.payload",)
     assert loose.moved["arm.payload"] < -10.0
     assert loose.values["arm.payload"] == pytest.approx(0.7 * 9.07, rel=0.03)
@@ -169,7 +169,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
     asked: list[tuple[str, ...]] = []
 
     class Trial:
-        settings, nominal, white = SETTINGS, RIG, {}
+        settings, nominal, no_inflation = SETTINGS, RIG, {}
         inner = Problem([], [], core_rig(RIG), SETTINGS)
 
         def fit_freed(self, names: tuple[str, ...], baseline: object, share: object) -> None:

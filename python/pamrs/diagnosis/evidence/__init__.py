@@ -1,7 +1,7 @@
 """Hypotheses, what speaks for each, and the verdict of each group of blocks.
 
 Public: `FittedHypothesis`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_out`,
-`autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
+`inflation_of`, `no_inflation`, `parts_of`, `start_of` (hypotheses and their fits);
 `BlockLikelihood` (how probable recordings are);
 `weigh`, `explains`, `is_absent`, `log_weight`, `LEAST_TEMPERING`, `share_left`, `same_recordings`,
 `probability_cap`, `possible_gain`, `prior_loss`, `Weighing` (their weights); `drop_undetermined`,
@@ -15,12 +15,12 @@ from pamrs.diagnosis.evidence._candidates import (
     Attempts,
     BlockGroup,
     FittedHypothesis,
-    autocorrelation_of,
+    inflation_of,
     misses_only_held_out,
+    no_inflation,
     parts_of,
     significant,
     start_of,
-    without_autocorrelation,
 )
 from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
 from pamrs.diagnosis.evidence._undetermined import (
@@ -67,7 +67,7 @@ __all__ = [
     "Judged",
     "Weighing",
     "are_alike",
-    "autocorrelation_of",
+    "inflation_of",
     "case_ambiguity",
     "case_probabilities",
     "drop_undetermined",
@@ -90,5 +90,5 @@ __all__ = [
     "start_of",
     "parameters_at_wall",
     "weigh",
-    "without_autocorrelation",
+    "no_inflation",
 ]

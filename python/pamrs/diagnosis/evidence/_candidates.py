@@ -18,10 +18,10 @@ from pamrs.diagnosis.fit import (
     LEAST_START,
     Events,
     Fit,
+    Inflation,
     Key,
     Problem,
     Start,
-    Weights,
     acts_in,
     entry_of,
     fit,
@@ -36,7 +36,14 @@ from pamrs.diagnosis.fit import (
     with_effects_of,
     without_term,
 )
-from pamrs.diagnosis.noise import CORRELATED_VARIANCE, Excess, NoiseLevel, apart, excess, inflation
+from pamrs.diagnosis.noise import (
+    CORRELATED_VARIANCE,
+    Excess,
+    NoiseLevel,
+    excess,
+    inflation_apart,
+    usual_inflation,
+)
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import predicted_by_others
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -239,9 +246,9 @@ class Attempts:
         return {entry["id"] for entry in self.nominal.effects}
 
     @property
-    def white(self) -> dict[str, float]:
-        """Weights of blocks whose noise has no autocorrelation: 1 for each."""
-        return without_autocorrelation(self.inner.blocks)
+    def no_inflation(self) -> dict[str, float]:
+        """Inflation of blocks whose residual has no autocorrelation: 1 for each."""
+        return no_inflation(self.inner.blocks)
 
     @cached_property
     def likelihood(self) -> Likelihood:
@@ -266,9 +273,9 @@ class Attempts:
         """True where no recording is held out."""
         return self.outer.recordings is self.inner.recordings
 
-    def autocorrelation(self, fitted: Fit) -> Weights:
-        """Weights of the autocorrelation that a fit leaves, and at the least that of the noise."""
-        return autocorrelation_of(self.inner, fitted, self.noise_level)
+    def inflation_of(self, fitted: Fit) -> Inflation:
+        """Inflation by the autocorrelation that a fit leaves, at the least that of the noise."""
+        return inflation_of(self.inner, fitted, self.noise_level)
 
     def start_of(self, fitted: Fit, effect: Term) -> Start:
         """Start of another fit from an effect as it was fitted."""
@@ -290,13 +297,13 @@ class Attempts:
         return self._attempt((*beside.terms, effect), lambda: self._fit_events(effect, beside))
 
     def _fit_events(self, effect: Term, beside: FittedHypothesis) -> FittedHypothesis | None:
-        white = self.white
+        no_inflation = self.no_inflation
         model = with_effects_of(self.nominal, beside.fit.rig, self.held)
-        fitted = fit_events(effect, self.inner, model, beside.fit, white)
+        fitted = fit_events(effect, self.inner, model, beside.fit, no_inflation)
         if fitted is None:
             return None
         if beside.effects:
-            fitted = self._refit_around_events(fitted, beside, white)
+            fitted = self._refit_around_events(fitted, beside, no_inflation)
         effects = (*beside.effects, effect)
         if self.same:
             return self.assess(effects, fitted)
@@ -304,7 +311,7 @@ class Attempts:
         quiet = residuals(self.outer, bare)
         form = fitted.events.form if fitted.events else ""
         known = {n: fitted.values[f"{effect}.{n}"] for n in effect.info.form(form).shared}
-        events = look_for_events(effect, self.outer, bare, quiet, white, known, form)
+        events = look_for_events(effect, self.outer, bare, quiet, no_inflation, known, form)
         if events is None:
             return self.assess(effects, fitted, quiet)
         everywhere = replace(
@@ -317,7 +324,7 @@ class Attempts:
         return self.assess(effects, everywhere, residuals(self.outer, bare, events=events))
 
     def _refit_around_events(
-        self, fitted: Fit, beside: FittedHypothesis, autocorrelation: dict[str, float]
+        self, fitted: Fit, beside: FittedHypothesis, inflation: dict[str, float]
     ) -> Fit:
         """Refit the persistent effects of a candidate while the events are held."""
         assert fitted.events is not None
@@ -327,7 +334,7 @@ class Attempts:
         )
         again = self._fit(
             self.starts_of(beside),
-            autocorrelation,
+            inflation,
             warm,
             events=fitted.events,
             evaluations=_EVALUATIONS_BESIDE,
@@ -357,7 +364,7 @@ class Attempts:
         inside = {b.name: self.excess(b, self.inner, fitted.residuals) for b in blocks}
         if outside is None:
             outside = (
-                predicted_by_others(self.inner, fitted, self.autocorrelation(fitted))
+                predicted_by_others(self.inner, fitted, self.inflation_of(fitted))
                 if self.same
                 else residuals(self.outer, fitted.rig)
             )
@@ -388,9 +395,9 @@ class Attempts:
         return [Term(effect, at) for at in ("", *places)]
 
     def fit_effects(
-        self, starts: list[Start], warm: Fit, autocorrelation: dict[str, float]
+        self, starts: list[Start], warm: Fit, inflation: dict[str, float]
     ) -> FittedHypothesis | None:
-        """Fit effects from one start each, residuals weighted by their own autocorrelation; None
+        """Fit effects from one start each, residuals inflated by their own autocorrelation; None
         where the model cannot be run.
         """
         effects = tuple(start.effect for start in starts)
@@ -400,11 +407,11 @@ class Attempts:
         limit = _SEALED_EVALUATIONS if sealed else settings.effect_evaluations
 
         def fit_and_assess() -> FittedHypothesis:
-            best = self._fit(starts, autocorrelation, warm, evaluations=limit)
-            weights = self.autocorrelation(best)
-            if weights.largest > CORRELATED_VARIANCE:
+            best = self._fit(starts, inflation, warm, evaluations=limit)
+            inflation_left = self.inflation_of(best)
+            if inflation_left.largest > CORRELATED_VARIANCE:
                 again = [self.start_of(best, effect) for effect in effects]
-                best = self._fit(again, weights, best, evaluations=limit)
+                best = self._fit(again, inflation_left, best, evaluations=limit)
             return self.assess(effects, best)
 
         return self._attempt(effects, fit_and_assess)
@@ -420,7 +427,9 @@ class Attempts:
             return None
 
         def fit_and_assess() -> FittedHypothesis:
-            short = self._fit(starts, self.white, warm, wrong=wrong, evaluations=_FIRST_EVALUATIONS)
+            short = self._fit(
+                starts, self.no_inflation, warm, wrong=wrong, evaluations=_FIRST_EVALUATIONS
+            )
             return replace(self.assess(effects, short), wrong=wrong)
 
         return self._attempt((*effects, *wrong), fit_and_assess)
@@ -439,7 +448,7 @@ class Attempts:
     def _fit(
         self,
         starts: list[Start],
-        weights: dict[str, float],
+        inflation: dict[str, float],
         warm: Fit,
         *,
         wrong: Collection[str] = (),
@@ -456,7 +465,7 @@ class Attempts:
             self.nominal,
             tuple(start.effect for start in starts),
             free,
-            weights,
+            inflation,
             fixed=held,
             warm=warm,
             events=events,
@@ -482,7 +491,7 @@ class Attempts:
             self.nominal,
             (),
             {},
-            self.white,
+            self.no_inflation,
             freed=names,
             settled={n: known[n].value for n in others},
             evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
@@ -499,7 +508,7 @@ class Attempts:
                 self.nominal,
                 (),
                 {},
-                self.white,
+                self.no_inflation,
                 warm=self._fit_alone(names),
                 freed=names,
                 evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
@@ -521,13 +530,13 @@ class Attempts:
         settings = self.settings
         least = FINAL_STEP_SHARE if share is None else share
 
-        def fitted(autocorrelation: dict[str, float], warm: Fit) -> Fit:
+        def fitted(inflation: dict[str, float], warm: Fit) -> Fit:
             return fit(
                 self.inner,
                 self.nominal,
                 (),
                 {},
-                autocorrelation,
+                inflation,
                 warm=warm,
                 freed=names,
                 evaluations=settings.baseline_evaluations,
@@ -535,10 +544,10 @@ class Attempts:
             )
 
         def fit_and_assess(alone: bool) -> FittedHypothesis:
-            first = fitted(self.white, self._fit_alone(names) if alone else baseline)
-            autocorrelation = self.autocorrelation(first)
-            correlated = autocorrelation.largest > CORRELATED_VARIANCE
-            assessed = self.assess((), fitted(autocorrelation, first) if correlated else first)
+            first = fitted(self.no_inflation, self._fit_alone(names) if alone else baseline)
+            inflation = self.inflation_of(first)
+            correlated = inflation.largest > CORRELATED_VARIANCE
+            assessed = self.assess((), fitted(inflation, first) if correlated else first)
             return replace(assessed, wrong=names)
 
         best: FittedHypothesis | None = None
@@ -559,7 +568,7 @@ class Attempts:
         where the model cannot be run, or where these parameters stay inside their tolerances.
         """
         if not wrong:
-            return self.fit_effects(starts, warm, self.white)
+            return self.fit_effects(starts, warm, self.no_inflation)
         limit = self.settings.effect_evaluations
         names = (*(start.effect for start in starts), *wrong)
         candidate = self._attempt(names, lambda: self._continue(starts, warm, wrong, limit))
@@ -575,23 +584,26 @@ class Attempts:
         evaluations: int,
         share: float | None = None,
     ) -> FittedHypothesis:
-        """Continue a fit of effects and freed parameters until its weights stop falling."""
+        """Continue a fit of effects and freed parameters until its inflation stops falling."""
         effects = tuple(start.effect for start in starts)
-        weights, fitted = self.autocorrelation(warm), warm
+        inflation, fitted = self.inflation_of(warm), warm
         for _ in range(_MOST_WEIGHTINGS):
             fitted = self._fit(
-                starts, weights, fitted, wrong=wrong, evaluations=evaluations, share=share
+                starts, inflation, fitted, wrong=wrong, evaluations=evaluations, share=share
             )
-            weights_left = self.autocorrelation(fitted)
-            if not self._lighter(weights_left, weights):
+            inflation_left = self.inflation_of(fitted)
+            if not self._lighter(inflation_left, inflation):
                 break
-            weights, starts = weights_left, [self.start_of(fitted, effect) for effect in effects]
+            inflation, starts = (
+                inflation_left,
+                [self.start_of(fitted, effect) for effect in effects],
+            )
         return replace(self.assess(effects, fitted), wrong=wrong)
 
-    def _lighter(self, weights_left: dict[str, float], weights: dict[str, float]) -> bool:
-        """True where a fit leaves much less autocorrelation than it was weighted by."""
+    def _lighter(self, inflation_left: dict[str, float], inflation: dict[str, float]) -> bool:
+        """True where a fit leaves much less inflation than it had."""
         return any(
-            CORRELATED_VARIANCE * now < weights[block] for block, now in weights_left.items()
+            CORRELATED_VARIANCE * now < inflation[block] for block, now in inflation_left.items()
         )
 
     def fit_united(self, candidates: list[FittedHypothesis]) -> Fit | None:
@@ -607,7 +619,8 @@ class Attempts:
         )
         names = (*(start.effect for start in starts), *wrong)
         return self._attempt(
-            names, lambda: self._fit(starts, self.white, warm, wrong=wrong, share=FINAL_STEP_SHARE)
+            names,
+            lambda: self._fit(starts, self.no_inflation, warm, wrong=wrong, share=FINAL_STEP_SHARE),
         )
 
     def polish(self, candidate: FittedHypothesis) -> FittedHypothesis:
@@ -626,17 +639,15 @@ class Attempts:
         return candidate if polished is None else replace(polished, gain=candidate.gain)
 
 
-def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:
-    """Weights of blocks whose noise is white."""
+def no_inflation(blocks: Iterable[Block]) -> dict[str, float]:
+    """Inflation of blocks whose residual is white noise: 1 for each."""
     return dict.fromkeys((b.name for b in blocks), 1.0)
 
 
-def autocorrelation_of(
-    problem: Problem, fitted: Fit, noise_level: Mapping[Key, NoiseLevel]
-) -> Weights:
-    """Weights of the autocorrelation that a fit leaves in each block, at the least that of the
+def inflation_of(problem: Problem, fitted: Fit, noise_level: Mapping[Key, NoiseLevel]) -> Inflation:
+    """Inflation by the autocorrelation that a fit leaves in each block, at the least that of the
     noise: parameters that follow the noise of a drive leave too little of it. A recording that is
-    missed by far more than most has a weight of its own, so that it takes none from the others.
+    missed by far more than most has one of its own, so that it takes no weight from the others.
     """
 
     def noise_of(block: Block) -> float:
@@ -646,14 +657,15 @@ def autocorrelation_of(
 
     recordings_and_residuals = problem.recordings, fitted.residuals, FIT_BIN_TIME
     usual = {
-        b.name: max(noise_of(b), inflation(b, *recordings_and_residuals)) for b in problem.blocks
+        b.name: max(noise_of(b), usual_inflation(b, *recordings_and_residuals))
+        for b in problem.blocks
     }
-    return Weights(
+    return Inflation(
         usual,
         {
-            key: weight
+            key: of_recording
             for b in problem.blocks
-            for key, weight in apart(b, *recordings_and_residuals).items()
+            for key, of_recording in inflation_apart(b, *recordings_and_residuals).items()
         },
     )
 
@@ -756,7 +768,7 @@ def _scatter(effects: tuple[Term, ...], problem: Problem, best: Fit) -> float:
             if r.jacobian is None or not acts_in(effects[0], block):
                 continue
             slope = r.jacobian[:, 0] / r.noise
-            unit = inflation(block, [prepared], with_slopes, FIT_BIN_TIME)
+            unit = usual_inflation(block, [prepared], with_slopes, FIT_BIN_TIME)
             num += float(slope @ (r.value / r.noise)) / unit
             den += float(slope @ slope) / unit
         if den > 0:

@@ -1,7 +1,7 @@
 """Models fitted to all blocks and recordings together: parameters inside their tolerances, effects
 from several starts.
 
-Public: `Problem`, `Fit`, `Scaling`, `Weights`,
+Public: `Problem`, `Fit`, `Scaling`, `Inflation`,
 `Unfollowed`, `fit`, `residuals`, `changes`, `stacked`,
 `with_priors`, `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`, `Residuals`, `Stages`;
 `levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where the fit of an effect begins);
@@ -29,13 +29,13 @@ from pamrs.diagnosis.fit._fitting import (
     LEAST_START,
     Events,
     Fit,
+    Inflation,
     Key,
     Problem,
     Residuals,
     Scaling,
     Stages,
     Unfollowed,
-    Weights,
     bin_width,
     changes,
     fit,
@@ -84,7 +84,7 @@ __all__ = [
     "Scaling",
     "Start",
     "Unfollowed",
-    "Weights",
+    "Inflation",
     "acts_in",
     "bin_width",
     "changes",

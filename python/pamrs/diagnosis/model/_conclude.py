@@ -17,10 +17,10 @@ from pamrs.diagnosis.evidence import (
     BlockGroup,
     FittedHypothesis,
     Judged,
-    autocorrelation_of,
     case_ambiguity,
     case_probabilities,
     drop_undetermined,
+    inflation_of,
     is_outside,
     judge,
     parts_of,
@@ -480,14 +480,14 @@ def _settled(
                 start_of(candidate.fit, effect, LEAST_START) for effect in effects
             )
             settled = {n: other.values[n] for n, other in common.items()}
-            autocorrelation = autocorrelation_of(part, candidate.fit, judged[k].group.noise_level)
+            inflation = inflation_of(part, candidate.fit, judged[k].group.noise_level)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
                 again = fit(
                     part,
                     nominal,
                     effects,
                     free,
-                    autocorrelation,
+                    inflation,
                     fixed=fixed,
                     warm=candidate.fit,
                     share=FINAL_STEP_SHARE,

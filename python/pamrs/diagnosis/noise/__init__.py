@@ -1,16 +1,17 @@
 """Noise levels with the noise of the drives, excess of residuals over them, autocorrelation.
 
 Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `means_in_noises`,
-`model_error`, `whitening`, `error_sizes`, `with_sizes`, `correlation_time`, `inflation`, `apart`.
+`model_error`, `whitening`, `error_sizes`, `with_sizes`, `correlation_time`, `usual_inflation`,
+`inflation_apart`.
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.noise._autocorrelation import (
     CORRELATED_VARIANCE,
-    apart,
     correlation_time,
-    inflation,
+    inflation_apart,
+    usual_inflation,
 )
 from pamrs.diagnosis.noise._discrepancy import model_error, whitening
 from pamrs.diagnosis.noise._levels import (
@@ -30,12 +31,12 @@ __all__ = [
     "LEAST_SIZE",
     "Excess",
     "NoiseLevel",
-    "apart",
+    "inflation_apart",
     "bins_of",
     "correlation_time",
     "error_sizes",
     "excess",
-    "inflation",
+    "usual_inflation",
     "means_in_noises",
     "model_error",
     "noise_levels",

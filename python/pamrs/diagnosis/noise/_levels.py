@@ -165,7 +165,7 @@ def noise_levels(
             base = residual(block, core, prepared, [])
             width = bins_of(prepared)
             powers: list[list[float]] = []
-            weights: list[float] = []
+            inflations: list[float] = []
             noisy = [name for name in block.drives if name in prepared.signals]
             rows = base.rows
             _, counts = binned(base.value, rows, width)
@@ -183,7 +183,9 @@ def noise_levels(
                     )
                 means, _ = binned(disturbed, rows, width)
                 raw = disturbed + base.freed(white_noise.normal(0.0, base.noise, prepared.n))
-                weights.append(inflated(raw, rows, bin_width(prepared, FIT_BIN_TIME), base.noise))
+                inflations.append(
+                    inflated(raw, rows, bin_width(prepared, FIT_BIN_TIME), base.noise)
+                )
                 own_noise = _own_noise(block, base, prepared, counts, width, rng)[usable]
                 parts = (disturbed[rows], means[usable], means[usable] + own_noise, own_noise)
                 powers.append([float(np.mean(v**2)) for v in parts])
@@ -211,7 +213,7 @@ def noise_levels(
                 math.sqrt(base.noise**2 + sample),
                 scatter=scatter,
                 curves=bent,
-                inflation=max(1.0, float(np.mean(weights))) if weights else 1.0,
+                inflation=max(1.0, float(np.mean(inflations))) if inflations else 1.0,
                 **_with_error(noise, error),
             )
     return levels

@@ -1,11 +1,11 @@
 """Hypotheses tried for a mismatch: effects alone and in sets, wrong values, forms without a name.
 
-Public: `examine` (all of it, for some blocks), `Mismatch`, `refitted`, `with_autocorrelation` (the
+Public: `examine` (all of it, for some blocks), `Mismatch`, `refitted`, `with_inflation` (the
 baseline alone), `find_misread`, `Reading`, `reading_errors` (other units of channels),
 `find_closure`, `free_suspects`, `suspected_values`.
 """
 
-from pamrs.diagnosis.search._baseline import refitted, with_autocorrelation
+from pamrs.diagnosis.search._baseline import refitted, with_inflation
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._hypotheses import Mismatch, examine
 from pamrs.diagnosis.search._readings import Reading, find_misread, reading_errors
@@ -21,5 +21,5 @@ __all__ = [
     "reading_errors",
     "refitted",
     "suspected_values",
-    "with_autocorrelation",
+    "with_inflation",
 ]

@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from pamrs.diagnosis.evidence import WALL_TOLERANCES, autocorrelation_of
+from pamrs.diagnosis.evidence import WALL_TOLERANCES, inflation_of
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
     Fit,
+    Inflation,
     Key,
     Problem,
     Unfollowed,
-    Weights,
     bin_width,
     fit,
     known_parameters,
@@ -33,39 +33,37 @@ _LEAST_OTHERS = 2  # recordings that have to agree against one: a single one is 
 _DRAGGED = 25.0  # times as large a sum of squares of the others beside one recording as without it
 
 
-def with_autocorrelation(
+def with_inflation(
     problem: Problem, nominal: Rig, first: Fit, noise_level: Mapping[Key, NoiseLevel]
-) -> tuple[Fit, Weights]:
-    """The refitted baseline, fitted on with the autocorrelation that it leaves as weights where
-    that is large, and the weights. What then lies at the end of its tolerances may have followed
-    the noise there: it is fitted from the nominal values too.
+) -> tuple[Fit, Inflation]:
+    """The refitted baseline, fitted on with the inflation by the autocorrelation that it leaves
+    where that is large, and that inflation. What then lies at the end of its tolerances may have
+    followed the noise there: it is fitted from the nominal values too.
     """
-    autocorrelation = autocorrelation_of(problem, first, noise_level)
-    if autocorrelation.largest <= CORRELATED_VARIANCE:
-        return first, autocorrelation
-    fitted = thorough(problem, nominal, autocorrelation, first)
-    for _ in range(_MOST_OWN_WEIGHTINGS if autocorrelation.apart else 0):
+    inflation = inflation_of(problem, first, noise_level)
+    if inflation.largest <= CORRELATED_VARIANCE:
+        return first, inflation
+    fitted = thorough(problem, nominal, inflation, first)
+    for _ in range(_MOST_OWN_WEIGHTINGS if inflation.apart else 0):
         # what stands apart had moved the baseline, and that missed the others
-        last, autocorrelation = autocorrelation, autocorrelation_of(problem, fitted, noise_level)
-        fitted = thorough(problem, nominal, autocorrelation, fitted)
-        if all(CORRELATED_VARIANCE * now >= last[name] for name, now in autocorrelation.items()):
+        last, inflation = inflation, inflation_of(problem, fitted, noise_level)
+        fitted = thorough(problem, nominal, inflation, fitted)
+        if all(CORRELATED_VARIANCE * now >= last[name] for name, now in inflation.items()):
             break
-    _tell_of_apart(problem, fitted, autocorrelation)
+    _tell_of_apart(problem, fitted, inflation)
     if any(abs(moved) >= WALL_TOLERANCES for moved in fitted.moved.values()):
-        fitted = min(
-            fitted, thorough(problem, nominal, autocorrelation, None), key=lambda f: f.cost
-        )
-    return fitted, autocorrelation
+        fitted = min(fitted, thorough(problem, nominal, inflation, None), key=lambda f: f.cost)
+    return fitted, inflation
 
 
-def _tell_of_apart(problem: Problem, fitted: Fit, weights: Weights) -> None:
+def _tell_of_apart(problem: Problem, fitted: Fit, inflation: Inflation) -> None:
     """Name the recordings that a refit misses by far more than the others."""
-    for block, name in weights.apart:
+    for block, name in inflation.apart:
         missed = {
             p.recording.name: _noise_levels(fitted.residuals[block, p.recording.name])
             for p in problem.recordings
         }
-        most = max(missed[n] for n in missed if (block, n) not in weights.apart)
+        most = max(missed[n] for n in missed if (block, n) not in inflation.apart)
         problem.losses.tell(
             f"block {block}: the refitted model misses {name} by {missed[name]:.3g} noise levels "
             f"and the others by {most:.3g} at most: it counts less than they do; look at it, or "

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._arrays import Array, Mask
-from pamrs.diagnosis.evidence import autocorrelation_of
+from pamrs.diagnosis.evidence import inflation_of
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, residuals, stacked, with_priors
 from pamrs.diagnosis.noise import NoiseLevel, correlation_time
 from pamrs.diagnosis.prepare import Block
@@ -97,7 +97,7 @@ def find_closure(
     share one memory time and one memory angle, which the fit then refines. A term is taken while
     the logarithm of the misfit falls by more than its price, counted on independent samples of what
     is left, and while recordings left out are predicted better with it (with one recording only the
-    price decides). The choice is made a second time at the fit, residuals weighted by the
+    price decides). The choice is made a second time at the fit, residuals inflated by the
     autocorrelation that they have there, and the best of the fits and the baseline is kept. This
     takes ten to fifteen evaluations of the problem.
 
@@ -146,20 +146,20 @@ def find_closure(
     )
     if first is None:
         return None
-    autocorrelation = autocorrelation_of(problem, first, noise_level or {})
+    inflation_left = inflation_of(problem, first, noise_level or {})
     candidates, columns, warm = _at_first_fit(
-        problem, baseline, first, autocorrelation, blocks, closures
+        problem, baseline, first, inflation_left, blocks, closures
     )
     second = _select(
-        _StackedFit.of(problem, warm, first, autocorrelation), candidates, columns, first.values
+        _StackedFit.of(problem, warm, first, inflation_left), candidates, columns, first.values
     )
     other = (
-        None if second is None else _fit_terms(problem, nominal, warm, autocorrelation, second, say)
+        None if second is None else _fit_terms(problem, nominal, warm, inflation_left, second, say)
     )
     return _best_model(
         [baseline, first, *([] if other is None else [other])],
         problem,
-        autocorrelation,
+        inflation_left,
         len(candidates),
     )
 

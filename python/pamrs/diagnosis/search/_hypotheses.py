@@ -25,13 +25,13 @@ from pamrs.diagnosis.evidence import (
     is_absent,
     is_unlikely,
     misses_only_held_out,
+    no_inflation,
     prior_loss,
     probability_cap,
     same_recordings,
     share_left,
     significant,
     weigh,
-    without_autocorrelation,
 )
 from pamrs.diagnosis.fit import (
     Fit,
@@ -67,7 +67,7 @@ from pamrs.diagnosis.screen import (
     predicted_by_others,
     screen,
 )
-from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
+from pamrs.diagnosis.search._baseline import refitted, thorough, with_inflation
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._considered import fit_considered
 from pamrs.diagnosis.search._sets import (
@@ -270,8 +270,8 @@ class _Refit:
         Recordings, model, noise levels, and the blocks that keep an excess.
     white_fit : Fit
         The refit with white noise.
-    autocorrelation : dict of str to float
-        Weights of the autocorrelation that it leaves.
+    inflation : dict of str to float
+        Inflation by the autocorrelation that it leaves.
     nominal_excess : dict of str to Excess
         What the nominal model leaves of the recordings to fit, by block.
     start : FittedHypothesis
@@ -287,7 +287,7 @@ class _Refit:
 
     trial: Attempts
     white_fit: Fit
-    autocorrelation: dict[str, float]
+    inflation: dict[str, float]
     nominal_excess: dict[str, Excess]
     start: FittedHypothesis
     held_out_alone: list[Block]
@@ -342,7 +342,7 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     """Fit parameters inside their tolerances, and find what each block keeps."""
     blocks, settings = inner.blocks, inner.settings
     nominal_residuals = residuals(inner, nominal)
-    white_fit = refitted(inner, nominal, without_autocorrelation(blocks))
+    white_fit = refitted(inner, nominal, no_inflation(blocks))
     stated = model_error(nominal, settings.usual_error)
     noise_level = noise_levels(inner, core_rig(white_fit.rig, inner.core), stated)
     if not same:
@@ -375,7 +375,7 @@ def _refit_with_error_sizes(
     """
     blocks, settings = inner.blocks, inner.settings
     noise_level = with_sizes(*error)
-    baseline, autocorrelation = with_autocorrelation(inner, nominal, white_fit, noise_level)
+    baseline, inflation = with_inflation(inner, nominal, white_fit, noise_level)
 
     def excess_by_block(
         problem: Problem, block_residuals: dict[Key, Residual]
@@ -390,9 +390,7 @@ def _refit_with_error_sizes(
         excess_by_block(inner, baseline.residuals),
     )
     outside = (
-        predicted_by_others(inner, baseline, autocorrelation)
-        if same
-        else residuals(outer, baseline.rig)
+        predicted_by_others(inner, baseline, inflation) if same else residuals(outer, baseline.rig)
     )
     held_out_excess = excess_by_block(outer, outside)
     # what parameters could not be told from the fitted recordings shows in the others alone, and is
@@ -419,7 +417,7 @@ def _refit_with_error_sizes(
         (), baseline, held_out_excess, fitted_excess, 0.0, likelihood=likelihood
     )
     return _Refit(
-        trial, white_fit, autocorrelation, nominal_excess, start, apart, nominal_residuals, error
+        trial, white_fit, inflation, nominal_excess, start, apart, nominal_residuals, error
     )
 
 
@@ -540,7 +538,9 @@ def _screen_mismatch(refit: _Refit, tell: Say) -> _SearchState:
     sealed = trial.nominal.model["valve"] is None
     # by the noise of the sensors, whatever error of the model the rig file states
     strong = far_above_noise(trial, start)
-    screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed, strong=strong)
+    screened = screen(
+        trial.inner, start.fit, persistent, trial.no_inflation, sealed=sealed, strong=strong
+    )
     weighing = Weighing(
         probability_cap(trial.inner, mismatch, now[mismatch.name].rms, alone=trial.same and sealed),
         max(p.n * p.dt for p in trial.inner.recordings),
@@ -601,7 +601,7 @@ class Mismatch:
         best = max(named, key=lambda c: _probability(self.weighed, c), default=None)
         fitted: list[FittedHypothesis] = []
         for one in starts:
-            alone = trial.fit_effects([one], start.fit, trial.white)
+            alone = trial.fit_effects([one], start.fit, trial.no_inflation)
             if alone is None or not _is_visible(alone, one):
                 continue  # a clock that is late by the same for all that a block sees
             fitted.append(alone)
@@ -672,8 +672,8 @@ class OnlyNoise:
         for start in starts:
             # held first: what the baseline hid it by has to let go of it
             known = replace(start, free={}, held=start.held | start.free)
-            first = trial.fit_effects([known], baseline.fit, trial.white)
-            both = first and trial.fit_effects([start], first.fit, trial.white)
+            first = trial.fit_effects([known], baseline.fit, trial.no_inflation)
+            both = first and trial.fit_effects([start], first.fit, trial.no_inflation)
             if both and _is_visible(both, start):
                 joint = both.fit
                 alike = (are_alike(joint.values[n], v, joint.std[n]) for n, v in start.free.items())
@@ -817,7 +817,7 @@ def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGro
         trial.inner,
         trial.nominal,
         start.fit,
-        refit.autocorrelation,
+        refit.inflation,
         suspects,
         say,
         trial.noise_level,
@@ -918,7 +918,7 @@ def _fit_all_recordings(trial: Attempts, start: FittedHypothesis) -> FittedHypot
     inner, outer = trial.inner, trial.outer
     both = replace(inner, recordings=[*inner.recordings, *outer.recordings])
     try:
-        common = thorough(both, trial.nominal, trial.white, start.fit)
+        common = thorough(both, trial.nominal, trial.no_inflation, start.fit)
     except SimulationError:
         return None
     fitted, held_out = (
@@ -979,10 +979,10 @@ def _fit_effect(
     """Fit an effect from a start with the baseline; where a few steps to the same start had left
     less, from where these had moved the baseline too.
     """
-    direct = trial.fit_effects([start], baseline, trial.white)
+    direct = trial.fit_effects([start], baseline, trial.no_inflation)
     if short is None or (direct is not None and direct.misfit <= short.misfit):
         return direct
-    from_short = trial.fit_effects([start], short.fit, trial.white)
+    from_short = trial.fit_effects([start], short.fit, trial.no_inflation)
     both = [c for c in (direct, from_short) if c is not None]
     return min(both, key=lambda c: c.misfit, default=None)
 
@@ -1137,7 +1137,7 @@ def _in_shape(search: Search, single: FittedHypothesis, same: SameData) -> Fitte
     if all(start.held[name] == value for name, value in held.items()):
         return single
     alike = trial.fit_effects(
-        [replace(start, held=start.held | held)], search.start.fit, trial.white
+        [replace(start, held=start.held | held)], search.start.fit, trial.no_inflation
     )
     if alike is None:
         return single
@@ -1153,7 +1153,7 @@ def _as_other(
     usual = {f"{same.effect}.{p.name}": p.default for p in parameters}
     usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{single.effects[0]}.{same.size}"]
     return trial.fit_effects(
-        [Start(Term(same.effect), usual, {}, (), False, same.form)], start.fit, trial.white
+        [Start(Term(same.effect), usual, {}, (), False, same.form)], start.fit, trial.no_inflation
     )
 
 
@@ -1166,4 +1166,4 @@ def _as_twin(
         return None
     free = {f"{twin}.{same.size}": size, f"{twin}.{same.without}": 0.0}
     held = {f"{twin}.{name}": value for name, value in same.held}
-    return trial.fit_effects([Start(twin, free, held, (), False)], start.fit, trial.white)
+    return trial.fit_effects([Start(twin, free, held, (), False)], start.fit, trial.no_inflation)

@@ -23,6 +23,7 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.channels import block_of, channel_of, unit_of
+from pamrs.diagnosis.evidence import no_inflation
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -174,7 +175,7 @@ def find_misread(problem: Problem, nominal: Rig) -> Reading | None:
     if not (small or large):
         return None
     try:
-        was = refitted(problem, nominal, _white(problem))
+        was = refitted(problem, nominal, no_inflation(problem.blocks))
     except SimulationError:
         return None
     fitted = [_fit_reading(problem, nominal, was, reading) for reading in large]
@@ -205,7 +206,7 @@ def _fit_reading(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> 
     """A reading with its fit, where the recordings ask for it."""
     reread = reading.read(problem)
     try:
-        now = refitted(reread, nominal, _white(problem))
+        now = refitted(reread, nominal, no_inflation(problem.blocks))
     except SimulationError:
         return None
     before, after = _power(problem, was), _power(reread, now)
@@ -227,12 +228,12 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     reread = reading.read(problem)
     beyond = replace(reading, factors=tuple(factor**2 for factor in reading.factors)).read(problem)
     try:
-        now = thorough(reread, nominal, _white(problem), was)
+        now = thorough(reread, nominal, no_inflation(problem.blocks), was)
         after = _power(reread, now)
         least = _CLEAR_STDS**2 * max(1.0, after)
         if 2.0 * (was.cost - now.cost) < least or not _is_noise(reread, now):
             return None
-        far = thorough(beyond, nominal, _white(problem), now)
+        far = thorough(beyond, nominal, no_inflation(problem.blocks), now)
     except SimulationError:
         return None
     # a parabola through none, the factor and its square, in steps of the factor
@@ -261,10 +262,6 @@ def _is_noise(problem: Problem, fitted: Fit) -> bool:
     return all(one.ratio <= one.limit for one in excesses)
 
 
-def _white(problem: Problem) -> dict[str, float]:
-    return {block.name: 1.0 for block in problem.blocks}
-
-
 def _power(problem: Problem, fitted: Fit) -> float:
     rows, _ = stacked(problem, fitted.residuals, fitted.inflation)
     return float(rows @ rows) / max(1, rows.size)
@@ -285,7 +282,7 @@ def _linear(problem: Problem, rig: Rig, names: Sequence[str]) -> float:
     of its parameters inside their tolerances.
     """
     known = known_parameters(rig)
-    rows, slope = stacked(problem, residuals(problem, rig, names), _white(problem))
+    rows, slope = stacked(problem, residuals(problem, rig, names), no_inflation(problem.blocks))
     square = float(rows @ rows)
     if not math.isfinite(square):
         raise SimulationError("a residual is not finite")

@@ -101,7 +101,7 @@ class Search:
         """The tangent space of a set, and the starts of each effect by what they would take of what
         the set leaves.
         """
-        tangent = tangent_of(base.fit, self.trial.inner, self.trial.white)
+        tangent = tangent_of(base.fit, self.trial.inner, self.trial.no_inflation)
         return tangent, by_effect(self.screened.scores(tangent, without=base.effects))
 
 
@@ -405,7 +405,7 @@ def _event_partners(
         least = max(LEAST_GAIN, _PARTNER_SHARE * mismatch)
         shown = [
             s
-            for s in screened.scores(tangent_of(beside, trial.inner, trial.white))
+            for s in screened.scores(tangent_of(beside, trial.inner, trial.no_inflation))
             if s.gain > least
         ]
         partner = next((c for s in shown for c in steady if c.effects == (s.effect,)), None)

@@ -149,7 +149,7 @@ def free_suspects(
         for freed in (baseline, first)
         for names in suspected_values(freed, trial.inner.blocks)
     ]
-    gains = _worth_a_fit(trial, baseline, list(dict.fromkeys(suspects)), trial.white)
+    gains = _worth_a_fit(trial, baseline, list(dict.fromkeys(suspects)), trial.no_inflation)
     # the linear model says little of what is far away: each parameter is fitted, whatever its
     # predicted gain beside others
     least = _PAIR_SHARE * max(gains.values(), default=0.0)
@@ -178,7 +178,7 @@ def far_parameters(trial: Attempts, fitted: Fit) -> list[str]:
     far: list[tuple[str, ...]] = [
         (name,) for name, moved in fitted.moved.items() if abs(moved) >= _FAR_TOLERANCES
     ]
-    gains = _worth_a_fit(trial, fitted, far, trial.autocorrelation(fitted))
+    gains = _worth_a_fit(trial, fitted, far, trial.inflation_of(fitted))
     return [name for (name,) in gains][:_MOST_BESIDE]
 
 
