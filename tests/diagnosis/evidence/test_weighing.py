@@ -281,4 +281,4 @@ def test_inside_the_error_of_the_model_effects_get_a_few_steps(
         with_error_sizes=lambda sizes: SimpleNamespace(trial=shortly),
         with_smaller_error=lambda candidates: candidates,
     )
-    assert _hypotheses._refit_with_smaller_model_error(refit, print) == ["start", *tried, "wrong"]
+    assert _hypotheses._refit_with_smaller_curve_error(refit, print) == ["start", *tried, "wrong"]

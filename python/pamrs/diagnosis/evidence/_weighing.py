@@ -31,7 +31,7 @@ LEAST_TEMPERING, _MOST_TEMPERING, _NOISE_TEMPERING = 0.01, 0.1, 0.3
 # share of what it explains that a right name leaves, as forms of equations err (decision 14)
 _FORM_ERROR = 0.1
 _FORM_SPREAD = math.log(3.0)  # spread of the logarithm of that share: a factor (decision 14)
-# [noise levels] error that is left beside whatever is explained: noise levels err (decision 14)
+# [noise levels of bin means] error beside whatever is explained: these levels err (decision 14)
 _LEAST_ERROR = 0.1
 _UNLISTED_PRICE = 6.0  # [log odds] price of physics without a name (decision 14)
 # odds of a name whose right fit was not found, or has no equation here, to physics without a name:
@@ -202,7 +202,7 @@ def _strain(candidate: FittedHypothesis) -> float:
 def _evidence(
     candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block], tempering: float
 ) -> float:
-    """Tempered log evidence of a hypothesis in some blocks, at the best size of the unstated error;
+    """Tempered log evidence of a hypothesis in some blocks, at the best size of the leftover error;
     an error above a tenth of what the hypothesis explains costs more, the larger it is.
     """
     total = 0.0

@@ -1,7 +1,7 @@
 """Noise levels with the noise of the drives, excess of residuals over them, autocorrelation.
 
 Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `means_in_noises`,
-`model_error`, `whitening`, `error_sizes`, `with_sizes`, `correlation_time`, `usual_inflation`,
+`curve_errors_of`, `whitening`, `error_sizes`, `with_sizes`, `correlation_time`, `usual_inflation`,
 `inflation_apart`.
 """
 
@@ -13,7 +13,7 @@ from pamrs.diagnosis.noise._autocorrelation import (
     inflation_apart,
     usual_inflation,
 )
-from pamrs.diagnosis.noise._discrepancy import model_error, whitening
+from pamrs.diagnosis.noise._discrepancy import curve_errors_of, whitening
 from pamrs.diagnosis.noise._levels import (
     LEAST_SIZE,
     Excess,
@@ -38,7 +38,7 @@ __all__ = [
     "excess",
     "usual_inflation",
     "means_in_noises",
-    "model_error",
+    "curve_errors_of",
     "noise_levels",
     "whitening",
     "with_sizes",

@@ -60,7 +60,7 @@ def _tell_of_apart(problem: Problem, fitted: Fit, inflation: Inflation) -> None:
     """Name the recordings that a refit misses by far more than the others."""
     for block, name in inflation.apart:
         missed = {
-            p.recording.name: _noise_levels(fitted.residuals[block, p.recording.name])
+            p.recording.name: _sample_noise_levels(fitted.residuals[block, p.recording.name])
             for p in problem.recordings
         }
         most = max(missed[n] for n in missed if (block, n) not in inflation.apart)
@@ -71,8 +71,8 @@ def _tell_of_apart(problem: Problem, fitted: Fit, inflation: Inflation) -> None:
         )
 
 
-def _noise_levels(residual: Residual) -> float:
-    """Root mean square of a residual in noise levels."""
+def _sample_noise_levels(residual: Residual) -> float:
+    """Root mean square of a residual in noise levels of single samples."""
     count = max(1, int(residual.rows.sum()))
     return float(np.linalg.norm(residual.value[residual.rows])) / math.sqrt(count) / residual.noise
 
@@ -122,7 +122,7 @@ def _as_the_others(problem: Problem, nominal: Rig, inflation: dict[str, float], 
     one makes most of what the others are missed by; else as it is.
     """
     missed = {
-        p.recording.name: max(map(_noise_levels, _of(p, fitted.residuals)))
+        p.recording.name: max(map(_sample_noise_levels, _of(p, fitted.residuals)))
         for p in problem.recordings
     }
     worst = max(missed, key=lambda name: missed[name])

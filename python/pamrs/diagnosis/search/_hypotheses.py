@@ -52,9 +52,9 @@ from pamrs.diagnosis.noise import (
     Excess,
     NoiseLevel,
     bins_of,
+    curve_errors_of,
     error_sizes,
     excess,
-    model_error,
     noise_levels,
     with_sizes,
 )
@@ -221,7 +221,7 @@ def _begin_part(
     ):
         what = "the search for effects inside the error of the model"
         smaller = inner.losses.part(
-            what, lambda: _refit_with_smaller_model_error(refit, tell), None
+            what, lambda: _refit_with_smaller_curve_error(refit, tell), None
         )
         if smaller is not None:
             return _fit_hypotheses(smaller, tell)
@@ -281,8 +281,8 @@ class _Refit:
     nominal_residuals : dict
         What the nominal model leaves of the recordings to fit.
     error : (dict, dict)
-        Noise levels with the error of the model that is taken for usual, and how large it is in
-        each block, as a share of that.
+        Noise levels with the curve error as stated or usual, and how large it is in each block, as
+        a share of that.
     """
 
     trial: Attempts
@@ -296,11 +296,11 @@ class _Refit:
 
     @property
     def error_is_given(self) -> bool:
-        """True where the size of the model's error is stated: by the rig file, or as none."""
+        """True where the size of the curve error is stated: by the rig file, or as none."""
         return _error_is_given(self.trial.nominal, self.trial.settings)
 
     def with_smaller_error(self, candidates: list[FittedHypothesis]) -> _Refit | None:
-        """Refit with the smaller error that the likeliest hypothesis leaves the model, or None."""
+        """Refit with the smaller curve error that the likeliest hypothesis leaves, or None."""
         trial, (usual, sizes) = self.trial, self.error
         each = [(c, *error_sizes(trial.inner, c.fit.residuals, usual)) for c in candidates]
         _, sizes_left, _ = max(each, key=lambda one: one[2] - _price(one[0], trial))
@@ -311,7 +311,7 @@ class _Refit:
         )
 
     def with_error_sizes(self, sizes: dict[str, float]) -> _Refit | None:
-        """Refit with other sizes of the model's error; None where these leave no mismatch."""
+        """Refit with other sizes of the curve error; None where these leave no mismatch."""
         trial = self.trial
         inputs = trial.inner, trial.outer, trial.nominal, self.white_fit, self.nominal_residuals
         refit = _refit_with_error_sizes(*inputs, (self.error[0], sizes), same=trial.same)
@@ -343,10 +343,10 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     blocks, settings = inner.blocks, inner.settings
     nominal_residuals = residuals(inner, nominal)
     white_fit = refitted(inner, nominal, no_inflation(blocks))
-    stated = model_error(nominal, settings.usual_error)
-    noise_level = noise_levels(inner, core_rig(white_fit.rig, inner.core), stated)
+    curve_errors = curve_errors_of(nominal, settings.usual_error)
+    noise_level = noise_levels(inner, core_rig(white_fit.rig, inner.core), curve_errors)
     if not same:
-        noise_level |= noise_levels(outer, core_rig(white_fit.rig, outer.core), stated)
+        noise_level |= noise_levels(outer, core_rig(white_fit.rig, outer.core), curve_errors)
     usual, sizes = noise_level, dict.fromkeys((b.name for b in blocks), 1.0)
     if not _error_is_given(nominal, settings):
         sizes, _ = error_sizes(inner, white_fit.residuals, usual)
@@ -356,7 +356,7 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
 
 
 def _error_is_given(nominal: Rig, settings: DiagnosisSettings) -> bool:
-    """True where the size of the model's error is stated: by the rig file, or as none."""
+    """True where the size of the curve error is stated: by the rig file, or as none."""
     return bool(nominal.model_error) or not settings.usual_error
 
 
@@ -370,8 +370,8 @@ def _refit_with_error_sizes(
     *,
     same: bool,
 ) -> _Refit:
-    """Refit with given sizes of the model's error: noise levels with the usual one, and its size in
-    each block as a share of that.
+    """Refit with given sizes of the curve error: noise levels with it as stated or usual, and its
+    size in each block as a share of that.
     """
     blocks, settings = inner.blocks, inner.settings
     noise_level = with_sizes(*error)
@@ -458,9 +458,9 @@ def _acting_effects(trial: Attempts) -> list[Term]:
     return [term for term in terms if any(acts_in(term, b) for b in trial.suspects)]
 
 
-def _refit_with_smaller_model_error(refit: _Refit, tell: Say) -> _Refit | None:
-    """Refit with a smaller model error where that and an effect are more probable than the usual
-    error and none; else None.
+def _refit_with_smaller_curve_error(refit: _Refit, tell: Say) -> _Refit | None:
+    """Refit with a smaller curve error where that and an effect are more probable than the usual
+    one and none; else None.
     """
     sizes = refit.error[1]
     if refit.error_is_given or max(sizes.values()) <= LEAST_SIZE:
@@ -508,7 +508,7 @@ class _SearchState:
 
 
 def _fit_hypotheses(refit: _Refit, tell: Say) -> Mismatch:
-    """Mismatch with every hypothesis that was tried for it, at one size of the model's error."""
+    """Mismatch with every hypothesis that was tried for it, at one size of the curve error."""
     state = _screen_mismatch(refit, tell)
     candidates = _fit_candidates(state.search, state.mistaken, state.per_recording, state.transient)
     candidates, weighed = _weigh_to_the_end(state.search, candidates)
@@ -536,7 +536,7 @@ def _screen_mismatch(refit: _Refit, tell: Say) -> _SearchState:
         [],
     )
     sealed = trial.nominal.model["valve"] is None
-    # by the noise of the sensors, whatever error of the model the rig file states
+    # by the noise of the sensors, whatever curve error there is
     strong = far_above_noise(trial, start)
     screened = screen(
         trial.inner, start.fit, persistent, trial.no_inflation, sealed=sealed, strong=strong
