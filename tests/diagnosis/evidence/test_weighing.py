@@ -52,7 +52,11 @@ def hypothesis(
     std = {name: spread for name, (_, spread) in known.items()}
     spreads = np.array(list(std.values()))
     alike = correlation + (1.0 - correlation) * np.eye(len(spreads))
-    fitted = {"std": std, "covariance": np.outer(spreads, spreads) * alike, "events": events}
+    fitted = {
+        "std": std,
+        "covariance": np.held_out_problem(spreads, spreads) * alike,
+        "events": events,
+    }
     kept = {"arm": Excess(1.0 + left * (BEFORE - 1.0), 0.0, 0.5, 1.0, 1.0, 1.2, 0.05)}
     return made_up(RIG, "+".join(effects), kept, values, **fitted)
 
@@ -180,13 +184,13 @@ def test_an_effect_that_the_file_states_as_uncertain_is_a_parameter(tmp_path: Pa
 def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
     """Other events and wrong values beside them are not fitted."""
     problem = Problem(BLOCKS, [], core_rig(RIG), SETTINGS)
-    trial = Attempts(problem, problem, RIG, {}, {}, BLOCKS)
+    attempts = Attempts(problem, problem, RIG, {}, {}, BLOCKS)
     pushed = hypothesis(
         {"external_torque": {}}, 0.2, events=Events(Term("external_torque"), {}, {})
     )
     wrong = replace(hypothesis({}, 0.2), wrong=("arm.payload",))
-    assert trial.fit_events(Term("payload_change"), pushed) is None
-    assert trial.fit_events(Term("payload_change"), wrong) is None
+    assert attempts.fit_events(Term("payload_change"), pushed) is None
+    assert attempts.fit_events(Term("payload_change"), wrong) is None
 
 
 def with_wrong(found: FittedHypothesis, *names: str) -> FittedHypothesis:
@@ -237,13 +241,13 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
         size = 1.0 if effect == "muscle_rate_damping" else 0.0
         return hypothesis({effect: {n: (size * v, s) for n, (v, s) in keys[effect].items()}}, 0.5)
 
-    trial = SimpleNamespace(
+    attempts = SimpleNamespace(
         settings=SETTINGS,
         fit_shortly=shortly,
         start_of=lambda fit, effect: Start(effect, {}, {}, (), False),
     )
     search = SimpleNamespace(
-        trial=trial, start=hypothesis({}, 1.0), weight=lambda candidate: candidate.misfit
+        attempts=attempts, start=hypothesis({}, 1.0), weight=lambda candidate: candidate.misfit
     )
     ranked = {
         term: [
@@ -278,7 +282,7 @@ def test_inside_the_error_of_the_model_effects_get_a_few_steps(
         error=({}, {"arm": 1.0}),
         error_is_given=False,
         start="start",
-        with_error_sizes=lambda sizes: SimpleNamespace(trial=shortly),
+        with_error_sizes=lambda sizes: SimpleNamespace(attempts=shortly),
         with_smaller_error=lambda candidates: candidates,
     )
     assert _hypotheses._refit_with_smaller_curve_error(refit, print) == ["start", *tried, "wrong"]

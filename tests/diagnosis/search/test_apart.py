@@ -58,7 +58,9 @@ def group(*found: FittedHypothesis) -> BlockGroup:
     every = [start, *found]
     probabilities = weigh(every, BLOCKS, WEIGHING)
     chamber = next(b for b in BLOCKS if b.name == "chamber")
-    return BlockGroup(BLOCKS, start.fitted, start.fitted, every, probabilities, chamber, {}, BLOCKS)
+    return BlockGroup(
+        BLOCKS, start.fit_excess, start.fit_excess, every, probabilities, chamber, {}, BLOCKS
+    )
 
 
 def leak(supply: float, chamber: float) -> FittedHypothesis:

@@ -179,7 +179,7 @@ def test_events_have_to_explain_fitted_and_held_out_recordings_alike() -> None:
     def left(fitted: float, held: float, happened: Events | None) -> FittedHypothesis:
         found = candidate("external_torque", fitted)
         ratio = {"chamber": Excess(1.0 + held, 0.0, 0.0, 1.0, 1.0, LIMIT)}
-        return replace(found, held_out=ratio, fit=replace(found.fit, events=happened))
+        return replace(found, held_out_excess=ratio, fit=replace(found.fit, events=happened))
 
     start = left(60.0, 20000.0, None)
 

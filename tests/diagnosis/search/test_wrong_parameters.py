@@ -170,7 +170,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
 
     class Trial:
         settings, nominal, no_inflation = SETTINGS, RIG, {}
-        inner = Problem([], [], core_rig(RIG), SETTINGS)
+        fit_problem = Problem([], [], core_rig(RIG), SETTINGS)
 
         def fit_freed(self, names: tuple[str, ...], baseline: object, share: object) -> None:
             asked.append(names)
@@ -185,10 +185,10 @@ def test_a_parameter_beside_another_has_to_take_a_share_of_its_own() -> None:
     def left(misfit: float) -> FittedHypothesis:
         return cast("FittedHypothesis", SimpleNamespace(misfit=misfit))
 
-    trial = cast("Attempts", SimpleNamespace(settings=SETTINGS))
+    attempts = cast("Attempts", SimpleNamespace(settings=SETTINGS))
     share = FURTHER_SHARE
     short = {("a",): left(100.0), ("b",): left(300.0), ("a", "b"): left(101.0 * (1.0 - share))}
-    assert _needless(("a", "b"), short, trial)
-    assert not _needless(("a", "b"), short | {("a", "b"): left(99.0 * (1.0 - share))}, trial)
-    assert not _needless(("a",), short, trial)
-    assert not _needless(("b", "c"), short | {("b", "c"): left(100.0)}, trial)
+    assert _needless(("a", "b"), short, attempts)
+    assert not _needless(("a", "b"), short | {("a", "b"): left(99.0 * (1.0 - share))}, attempts)
+    assert not _needless(("a",), short, attempts)
+    assert not _needless(("b", "c"), short | {("b", "c"): left(100.0)}, attempts)

@@ -70,7 +70,7 @@ _MOST_WEIGHTINGS = 4
 _SCATTER_STDS = 2.0
 # share of the nominal stable step below which no events are sought: too slow (decision 103)
 _LEAST_STEP_SHARE = 0.2
-_EVALUATIONS_BESIDE = 6  # evaluations of the fit of persistent effects beside events that are held
+_EVALUATIONS_BESIDE = 6  # evaluations of the fit of persistent effects beside events that stay
 _FIRST_EVALUATIONS = 5  # evaluations of such a fit (decision 13)
 # evaluations of a freed parameter's first fit: is it worth a whole one (decision 25)
 _WRONG_PARAMETERS_FIRST_EVALUATIONS = 6
@@ -89,9 +89,9 @@ class FittedHypothesis:
         Its effects; empty for the baseline.
     fit : Fit
         On the recordings to fit.
-    held_out : dict of str to Excess
+    held_out_excess : dict of str to Excess
         By block, on held-out recordings; without any, on each recording as predicted by the others.
-    fitted : dict of str to Excess
+    fit_excess : dict of str to Excess
         By block, on the recordings to fit.
     gap_closed : float
         Share of the baseline's excess that it removes on held-out recordings.
@@ -111,8 +111,8 @@ class FittedHypothesis:
 
     effects: tuple[Term, ...]
     fit: Fit
-    held_out: dict[str, Excess]
-    fitted: dict[str, Excess]
+    held_out_excess: dict[str, Excess]
+    fit_excess: dict[str, Excess]
     gap_closed: float
     scattered: Callable[[], float] = field(default=float, repr=False)
     gain: float = 0.0
@@ -130,11 +130,11 @@ class FittedHypothesis:
         """Hypothesis that its effects and wrong parameters are."""
         return Hypothesis(self.terms)
 
-    def outside(self, walls: float) -> float:
+    def beyond_walls(self, walls: float) -> float:
         """Sum of ``log(|moved| / walls)`` over its wrong parameters, each at least 0."""
-        return sum(self.outside_of(name, walls) for name in self.wrong)
+        return sum(self.beyond_walls_by(name, walls) for name in self.wrong)
 
-    def outside_of(self, name: str, walls: float) -> float:
+    def beyond_walls_by(self, name: str, walls: float) -> float:
         """Distance of a wrong parameter beyond the walls: ``log(|moved| / walls)``, at least 0."""
         return math.log(max(1.0, abs(self.fit.moved[name]) / walls))
 
@@ -209,73 +209,88 @@ def significant(excess_of_block: Excess, ratio: float = 1.0) -> bool:
 
 
 def misses_only_held_out(
-    inside: dict[str, Excess], after: dict[str, Excess], *, same: bool
+    fit_excess: dict[str, Excess], held_out_excess: dict[str, Excess], *, same: bool
 ) -> bool:
     """True where a fit leaves noise in its own recordings and more in held-out ones: parameters
     that its own recordings do not determine may bring that (docs/decisions/0111).
     """
-    quiet = not any(significant(e) for e in inside.values())
-    return not same and quiet and any(significant(e) for e in after.values())
+    quiet = not any(significant(e) for e in fit_excess.values())
+    return not same and quiet and any(significant(e) for e in held_out_excess.values())
 
 
 @dataclass(frozen=True, eq=False)
 class Attempts:
-    """Fits of hypotheses to the recordings of one model, and what these leave of them."""
+    """Fits of hypotheses to the recordings of one model, and what these leave of them.
 
-    inner: Problem
-    outer: Problem
+    Attributes
+    ----------
+    fit_problem, held_out_problem : Problem
+        Recordings to fit and held-out ones (the same recordings where there are no others).
+    nominal : Rig
+        The model of the rig file, to which hypotheses add.
+    noise_level : dict
+        Noise levels by block and recording, of all recordings.
+    baseline_excess : dict of str to Excess
+        By block, what the refitted baseline leaves of held-out recordings; without any, of each
+        recording as predicted by the others. The shares of it that fits remove are compared.
+    suspects : list of Block
+        Blocks that keep an excess after the refit.
+    """
+
+    fit_problem: Problem
+    held_out_problem: Problem
     nominal: Rig
     noise_level: dict[Key, NoiseLevel]
-    held_out: dict[str, Excess]
+    baseline_excess: dict[str, Excess]
     suspects: list[Block]
 
     @property
     def settings(self) -> DiagnosisSettings:
         """Settings of the diagnosis."""
-        return self.inner.settings
+        return self.fit_problem.settings
 
     @property
     def compared(self) -> list[Block]:
         """Blocks with an excess and others of their kind, by which hypotheses are compared."""
         kinds = {channel_of(b.name) for b in self.suspects}
-        return [b for b in self.inner.blocks if channel_of(b.name) in kinds]
+        return [b for b in self.fit_problem.blocks if channel_of(b.name) in kinds]
 
     @property
-    def held(self) -> set[str]:
-        """Ids of the effects that the nominal model holds already."""
+    def nominal_effects(self) -> set[str]:
+        """Ids of the effects that the nominal model has already."""
         return {entry["id"] for entry in self.nominal.effects}
 
     @property
     def no_inflation(self) -> dict[str, float]:
         """Inflation of blocks whose residual has no autocorrelation: 1 for each."""
-        return no_inflation(self.inner.blocks)
+        return no_inflation(self.fit_problem.blocks)
 
     @cached_property
     def likelihood(self) -> Likelihood:
         """Likelihood of what a hypothesis leaves of all recordings, fitted and held out."""
-        held_out = [] if self.same else self.outer.recordings
-        recordings = [*self.inner.recordings, *held_out]
-        return Likelihood(self.inner.blocks, recordings, self.noise_level)
+        held_out = [] if self.same else self.held_out_problem.recordings
+        recordings = [*self.fit_problem.recordings, *held_out]
+        return Likelihood(self.fit_problem.blocks, recordings, self.noise_level)
 
     def likelihood_of(
-        self, inside: Mapping[Key, Residual], outside: Mapping[Key, Residual]
+        self, fit_residuals: Mapping[Key, Residual], held_out_residuals: Mapping[Key, Residual]
     ) -> Callable[[], Mapping[str, BlockLikelihood]]:
         """Likelihood of a hypothesis's residuals by block, worked out when it is asked for.
 
         Where no recording is held out it is that of the fitted residuals: what others predict of
         each recording does not enter.
         """
-        residuals_of_all = inside if self.same else {**inside, **outside}
-        return cache(partial(self.likelihood.of, residuals_of_all))
+        every = fit_residuals if self.same else {**fit_residuals, **held_out_residuals}
+        return cache(partial(self.likelihood.of, every))
 
     @property
     def same(self) -> bool:
         """True where no recording is held out."""
-        return self.outer.recordings is self.inner.recordings
+        return self.held_out_problem.recordings is self.fit_problem.recordings
 
     def inflation_of(self, fitted: Fit) -> Inflation:
         """Inflation by the autocorrelation that a fit leaves, at the least that of the noise."""
-        return inflation_of(self.inner, fitted, self.noise_level)
+        return inflation_of(self.fit_problem, fitted, self.noise_level)
 
     def start_of(self, fitted: Fit, effect: Term) -> Start:
         """Start of another fit from an effect as it was fitted."""
@@ -291,15 +306,15 @@ class Attempts:
             return None  # it would replace what it is to happen beside
         if beside.fit.events is not None or beside.wrong:
             return None  # what happens beside other events, or wrong values, is not fitted
-        stiffest = _LEAST_STEP_SHARE * self.inner.core.stable_step
-        if core_rig(beside.fit.rig, self.inner.core).stable_step < stiffest:
+        stiffest = _LEAST_STEP_SHARE * self.fit_problem.core.stable_step
+        if core_rig(beside.fit.rig, self.fit_problem.core).stable_step < stiffest:
             return None  # it would take too long
         return self._attempt((*beside.terms, effect), lambda: self._fit_events(effect, beside))
 
     def _fit_events(self, effect: Term, beside: FittedHypothesis) -> FittedHypothesis | None:
         no_inflation = self.no_inflation
-        model = with_effects_of(self.nominal, beside.fit.rig, self.held)
-        fitted = fit_events(effect, self.inner, model, beside.fit, no_inflation)
+        model = with_effects_of(self.nominal, beside.fit.rig, self.nominal_effects)
+        fitted = fit_events(effect, self.fit_problem, model, beside.fit, no_inflation)
         if fitted is None:
             return None
         if beside.effects:
@@ -308,10 +323,12 @@ class Attempts:
         if self.same:
             return self.assess(effects, fitted)
         bare = without_term(fitted.rig, effect)
-        quiet = residuals(self.outer, bare)
+        quiet = residuals(self.held_out_problem, bare)
         form = fitted.events.form if fitted.events else ""
         known = {n: fitted.values[f"{effect}.{n}"] for n in effect.info.form(form).shared}
-        events = look_for_events(effect, self.outer, bare, quiet, no_inflation, known, form)
+        events = look_for_events(
+            effect, self.held_out_problem, bare, quiet, no_inflation, known, form
+        )
         if events is None:
             return self.assess(effects, fitted, quiet)
         everywhere = replace(
@@ -321,12 +338,14 @@ class Attempts:
                 values=fitted.events.values | events.values if fitted.events else events.values,
             ),
         )
-        return self.assess(effects, everywhere, residuals(self.outer, bare, events=events))
+        return self.assess(
+            effects, everywhere, residuals(self.held_out_problem, bare, events=events)
+        )
 
     def _refit_around_events(
         self, fitted: Fit, beside: FittedHypothesis, inflation: dict[str, float]
     ) -> Fit:
-        """Refit the persistent effects of a candidate while the events are held."""
+        """Refit the persistent effects of a candidate while the events stay as they are."""
         assert fitted.events is not None
         effect = fitted.events.effect
         warm = replace(
@@ -355,25 +374,37 @@ class Attempts:
         return excess(block, problem.recordings, block_residuals, self.noise_level, self.settings)
 
     def assess(
-        self, effects: tuple[Term, ...], fitted: Fit, outside: dict[Key, Residual] | None = None
+        self,
+        effects: tuple[Term, ...],
+        fitted: Fit,
+        held_out_residuals: dict[Key, Residual] | None = None,
     ) -> FittedHypothesis:
         """A fit with its excess over the noise, in the recordings that were fitted and in held-out
         ones; without any, in each recording as the others predict it.
         """
-        blocks = self.inner.blocks
-        inside = {b.name: self.excess(b, self.inner, fitted.residuals) for b in blocks}
-        if outside is None:
-            outside = (
-                predicted_by_others(self.inner, fitted, self.inflation_of(fitted))
+        blocks = self.fit_problem.blocks
+        fit_excess = {b.name: self.excess(b, self.fit_problem, fitted.residuals) for b in blocks}
+        if held_out_residuals is None:
+            held_out_residuals = (
+                predicted_by_others(self.fit_problem, fitted, self.inflation_of(fitted))
                 if self.same
-                else residuals(self.outer, fitted.rig)
+                else residuals(self.held_out_problem, fitted.rig)
             )
-        after = {b.name: self.excess(b, self.outer, outside) for b in blocks}
-        if fitted.events is None and misses_only_held_out(inside, after, same=self.same):
-            outside = predicted_with_doubt(self.outer, fitted)
-            after = {b.name: self.excess(b, self.outer, outside) for b in blocks}
+        held_out_excess = {
+            b.name: self.excess(b, self.held_out_problem, held_out_residuals) for b in blocks
+        }
+        if fitted.events is None and misses_only_held_out(
+            fit_excess, held_out_excess, same=self.same
+        ):
+            held_out_residuals = predicted_with_doubt(self.held_out_problem, fitted)
+            held_out_excess = {
+                b.name: self.excess(b, self.held_out_problem, held_out_residuals) for b in blocks
+            }
         gaps = [
-            (self.held_out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0))
+            (
+                self.baseline_excess[b.name].ratio - 1.0,
+                max(0.0, held_out_excess[b.name].ratio - 1.0),
+            )
             for b in self.suspects
         ]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
@@ -381,17 +412,17 @@ class Attempts:
         return FittedHypothesis(
             effects,
             fitted,
-            after,
-            inside,
+            held_out_excess,
+            fit_excess,
             gap,
-            scattered=cache(partial(_scatter, effects, self.inner, fitted)),
+            scattered=cache(partial(_scatter, effects, self.fit_problem, fitted)),
             places=sum(math.log(len(self.terms_of(e.id))) for e in effects),
-            likelihood=self.likelihood_of(fitted.residuals, outside),
+            likelihood=self.likelihood_of(fitted.residuals, held_out_residuals),
         )
 
     def terms_of(self, effect: str) -> list[Term]:
         """Terms of an effect: everywhere, and at each place that the blocks can distinguish."""
-        places = places_of(self.nominal, effect, self.inner.blocks)
+        places = places_of(self.nominal, effect, self.fit_problem.blocks)
         return [Term(effect, at) for at in ("", *places)]
 
     def fit_effects(
@@ -401,8 +432,8 @@ class Attempts:
         where the model cannot be run.
         """
         effects = tuple(start.effect for start in starts)
-        if not self.held.isdisjoint(e.id for e in effects):
-            return None  # it would replace what the model holds
+        if not self.nominal_effects.isdisjoint(e.id for e in effects):
+            return None  # it would replace what the model has
         settings, sealed = self.settings, self.nominal.model["valve"] is None
         limit = _SEALED_EVALUATIONS if sealed else settings.effect_evaluations
 
@@ -423,7 +454,7 @@ class Attempts:
         worth a whole fit; None where the model cannot be run.
         """
         effects = tuple(start.effect for start in starts)
-        if not self.held.isdisjoint(e.id for e in effects):
+        if not self.nominal_effects.isdisjoint(e.id for e in effects):
             return None
 
         def fit_and_assess() -> FittedHypothesis:
@@ -437,13 +468,15 @@ class Attempts:
     def _attempt(self, terms: Iterable[object], work: Callable[[], Found]) -> Found | None:
         """Run an attempt at a hypothesis; None where it leaves the model's range or fails."""
 
-        def inside() -> Found | None:
+        def in_range() -> Found | None:
             try:
                 return work()
             except SimulationError:
                 return None
 
-        return self.inner.losses.part(f"the hypothesis {' + '.join(map(str, terms))}", inside)
+        return self.fit_problem.losses.part(
+            f"the hypothesis {' + '.join(map(str, terms))}", in_range
+        )
 
     def _fit(
         self,
@@ -459,14 +492,14 @@ class Attempts:
         """Fit effects from a start of each, with the baseline from where another fit left it and
         some parameters freed; the rest as in :func:`pamrs.diagnosis.fit.fit`.
         """
-        free, held, forms = parts_of(starts)
+        free, fixed, forms = parts_of(starts)
         fitted = fit(
-            self.inner,
+            self.fit_problem,
             self.nominal,
             tuple(start.effect for start in starts),
             free,
             inflation,
-            fixed=held,
+            fixed=fixed,
             warm=warm,
             events=events,
             evaluations=evaluations,
@@ -474,7 +507,7 @@ class Attempts:
             freed=wrong,
             forms=forms,
         )
-        if _emptier_than_empty(self.inner, fitted):
+        if _emptier_than_empty(self.fit_problem, fitted):
             raise SimulationError("a pressure behind a slow gauge is below the ambient")
         return fitted
 
@@ -485,9 +518,9 @@ class Attempts:
         reach their walls.
         """
         known = known_parameters(self.nominal)
-        others = [n for n in free_baseline(self.inner, self.nominal) if n not in names]
+        others = [n for n in free_baseline(self.fit_problem, self.nominal) if n not in names]
         return fit(
-            self.inner,
+            self.fit_problem,
             self.nominal,
             (),
             {},
@@ -504,7 +537,7 @@ class Attempts:
 
         def fit_and_assess() -> FittedHypothesis:
             short = fit(
-                self.inner,
+                self.fit_problem,
                 self.nominal,
                 (),
                 {},
@@ -532,7 +565,7 @@ class Attempts:
 
         def fitted(inflation: dict[str, float], warm: Fit) -> Fit:
             return fit(
-                self.inner,
+                self.fit_problem,
                 self.nominal,
                 (),
                 {},
@@ -557,7 +590,7 @@ class Attempts:
                 continue
             if best is None or assessed.misfit < best.misfit:
                 best = assessed
-            if not any(significant(e) for e in best.fitted.values()):
+            if not any(significant(e) for e in best.fit_excess.values()):
                 break
         return best
 
@@ -673,19 +706,19 @@ def inflation_of(problem: Problem, fitted: Fit, noise_level: Mapping[Key, NoiseL
 def parts_of(
     starts: Iterable[Start],
 ) -> tuple[dict[str, float], dict[str, float], dict[Term, str]]:
-    """Free parameters, held parameters and forms of several starts."""
+    """Free parameters, fixed parameters and forms of several starts."""
     free: dict[str, float] = {}
-    held: dict[str, float] = {}
+    fixed: dict[str, float] = {}
     forms: dict[Term, str] = {}
     for start in starts:
         free |= start.free
-        held |= start.held
+        fixed |= start.fixed
         forms[start.effect] = start.form
-    return free, held, forms
+    return free, fixed, forms
 
 
 def start_of(fitted: Fit, effect: Term, least: float) -> Start:
-    """Start of another fit from an effect as it was fitted, held parameters included.
+    """Start of another fit from an effect as it was fitted, fixed parameters included.
 
     ``least`` is the share of a typical size that a parameter has at the least.
     """
@@ -695,12 +728,12 @@ def start_of(fitted: Fit, effect: Term, least: float) -> Start:
         if effect_of(name) == effect
     }
     entry = entry_of(fitted.rig, effect)
-    held = {
+    fixed = {
         f"{effect}.{n}": v
         for n, v in entry["parameters"].items()
         if f"{effect}.{n}" not in fitted.values
     }
-    return Start(effect, free, held, (), False, form_in(fitted.rig, effect))
+    return Start(effect, free, fixed, (), False, form_in(fitted.rig, effect))
 
 
 def _off_zero(name: str, value: float, share: float) -> float:

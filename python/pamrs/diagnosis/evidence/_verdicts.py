@@ -132,7 +132,7 @@ def _probabilities_alone(group: BlockGroup) -> dict[Hypothesis, float]:
 def _leaves_little(group: BlockGroup) -> bool:
     """True where the refit leaves less of every block than ``unlisted`` needs."""
     start = group.candidates[0]
-    every = [*start.fitted.values(), *start.held_out.values()]
+    every = [*start.fit_excess.values(), *start.held_out_excess.values()]
     return bool(every) and max(e.systematic for e in every) < _LEAST_UNLISTED
 
 

@@ -268,8 +268,8 @@ def _excesses(
         return sum(max(0.0, found[b.name].ratio - 1.0) for b in suspects)
 
     return [
-        (over(baseline.fitted), over(candidate.fitted)),
-        (over(baseline.held_out), over(candidate.held_out)),
+        (over(baseline.fit_excess), over(candidate.fit_excess)),
+        (over(baseline.held_out_excess), over(candidate.held_out_excess)),
     ]
 
 
@@ -278,7 +278,9 @@ def explains(
 ) -> bool:
     """True where a candidate leaves only noise, fitted and held out, of what was clearly more."""
     quiet = not any(
-        significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out)
+        significant(e[b.name])
+        for b in suspects
+        for e in (candidate.fit_excess, candidate.held_out_excess)
     )
     before, after = max(_excesses(candidate, baseline, suspects))
     return quiet and after < _EXPLAINED_SHARE * before
@@ -426,7 +428,7 @@ def price(candidate: FittedHypothesis, settings: DiagnosisSettings) -> float:
 def _own_price(candidate: FittedHypothesis, term: Term, settings: DiagnosisSettings) -> float:
     """Log odds paid for an effect's parameters, or for how far a value of the file is wrong."""
     if term.id in candidate.wrong:
-        return settings.wrong_price + candidate.outside_of(term.id, settings.most_tolerances)
+        return settings.wrong_price + candidate.beyond_walls_by(term.id, settings.most_tolerances)
     parameters = (n for n in candidate.fit.effect_values if effect_of(n) == term)
     return settings.parameter_price * sum(not find_parameter(n).repeats for n in parameters)
 

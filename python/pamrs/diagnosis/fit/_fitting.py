@@ -628,7 +628,7 @@ def fit(
         Variance of each block's binned residual relative to white sample noise (autocorrelated
         residuals count less); of single recordings where it is :class:`Inflation`.
     fixed : dict of str to float, optional
-        Effect parameters that are held.
+        Effect parameters that stay fixed.
     warm : Fit, optional
         A fit of the same problem from whose baseline values to start.
     events : Events, optional

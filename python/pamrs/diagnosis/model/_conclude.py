@@ -130,7 +130,7 @@ class Conclusion:
         Those that are left open.
     noise_level : dict
         By block and recording.
-    inside, outside : dict of str to dict
+    fit_residuals, held_out_residuals : dict of str to dict
         Residuals of the recordings to fit and of the held-out ones (the same where there are no
         others) by stage (``before``, ``refit``, ``after``), block and recording.
     errors : dict of str to dict
@@ -153,8 +153,8 @@ class Conclusion:
     probabilities: dict[Hypothesis, float]
     ambiguity: list[Hypothesis]
     noise_level: dict[Key, NoiseLevel]
-    inside: dict[str, dict[Key, Residual]]
-    outside: dict[str, dict[Key, Residual]]
+    fit_residuals: dict[str, dict[Key, Residual]]
+    held_out_residuals: dict[str, dict[Key, Residual]]
     errors: dict[str, dict[str, ChannelError]]
     budget: list[BudgetTerm]
     runs: list[FreeRun] | None
@@ -177,27 +177,35 @@ class Conclusion:
         return _models_of(self.judged, self.probabilities, self.models.nominal, problem)
 
 
-def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGroup]) -> Conclusion:
+def conclude(
+    nominal: Rig, fit_problem: Problem, held_out_problem: Problem, groups: list[BlockGroup]
+) -> Conclusion:
     """Merge what the groups of blocks found into one model, and compute what it leaves.
 
     Parameters
     ----------
     nominal : Rig
         The model of the rig file.
-    fitted, held : Problem
+    fit_problem, held_out_problem : Problem
         Recordings to fit and held-out ones (the same object when there are no others).
     groups : list of BlockGroup
         Gas blocks and arm, examined.
     """
     noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
-    models, inside, outside = _sound_models(nominal, fitted, held, groups, noise_level)
-    judged, part = models.judged, fitted.losses.part
-    fit_table = _table(fitted, inside, noise_level)
-    held_table = _table(held, outside, noise_level) if held is not fitted else {}
-    budgeted = partial(budget, judged, held, outside, noise_level, nominal)
+    models, fit_residuals, held_out_residuals = _sound_models(
+        nominal, fit_problem, held_out_problem, groups, noise_level
+    )
+    judged, part = models.judged, fit_problem.losses.part
+    fit_table = _table(fit_problem, fit_residuals, noise_level)
+    held_out_table = (
+        {}
+        if held_out_problem is fit_problem
+        else _table(held_out_problem, held_out_residuals, noise_level)
+    )
+    budgeted = partial(budget, judged, held_out_problem, held_out_residuals, noise_level, nominal)
     known = _known(models)
     ending = models.final, models.events, known, noise_level
-    running = partial(free_run, held, outside, nominal, *ending)
+    running = partial(free_run, held_out_problem, held_out_residuals, nominal, *ending)
     nothing: tuple[list[FreeRun] | None, str, list[Trace]] = (None, "the free run failed", [])
     terms = part("the budget", lambda: budgeted(models.final, models.events), [])
     runs, note, curves = part("the free run", running, nothing)
@@ -206,14 +214,14 @@ def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGro
         case_probabilities(judged),
         case_ambiguity(judged),
         noise_level,
-        inside,
-        outside,
-        {"fit": fit_table, "held_out": held_table},
+        fit_residuals,
+        held_out_residuals,
+        {"fit": fit_table, "held_out": held_out_table},
         terms,
         runs,
         note,
         curves,
-        _own_errors(fitted, noise_level),
+        _own_errors(fit_problem, noise_level),
     )
 
 
@@ -230,8 +238,8 @@ def _own_errors(problem: Problem, noise_level: dict[Key, NoiseLevel]) -> dict[st
 
 def _sound_models(
     nominal: Rig,
-    fitted: Problem,
-    held: Problem,
+    fit_problem: Problem,
+    held_out_problem: Problem,
     groups: list[BlockGroup],
     noise_level: dict[Key, NoiseLevel],
 ) -> tuple[Models, dict[str, dict[Key, Residual]], dict[str, dict[Key, Residual]]]:
@@ -243,20 +251,22 @@ def _sound_models(
     where a value called wrong is inside its tolerances. The answer that nothing is missing is taken
     out where the model misses far more than noise and its own error.
     """
-    settings, errors = fitted.settings, _own_errors(fitted, noise_level)
-    groups = [drop_undetermined(group, fitted) for group in groups]
+    settings, errors = fit_problem.settings, _own_errors(fit_problem, noise_level)
+    groups = [drop_undetermined(group, fit_problem) for group in groups]
     while True:
         judged = judge(groups, settings)
-        models = _models(nominal, fitted, judged, case_verdict(j.verdict for j in judged))
-        inside = models.residuals(fitted)
-        outside = inside if held is fitted else models.residuals(held)
-        problem, by_stage = (fitted, inside) if held is fitted else (held, outside)
-        table = _table(problem, by_stage, noise_level)
+        models = _models(nominal, fit_problem, judged, case_verdict(j.verdict for j in judged))
+        fit_residuals = models.residuals(fit_problem)
+        held_out_residuals = (
+            fit_residuals if held_out_problem is fit_problem else models.residuals(held_out_problem)
+        )
+        # where there are no others both are those of the fitted recordings
+        table = _table(held_out_problem, held_out_residuals, noise_level)
         blamed = _blamed(models.judged, spoiled_channels(table)) | _needless(models, settings)
         blamed |= _worse_than_file(models.judged, table, settings.noise_margin - 1.0)
         missing = {k: _missed(j, table, errors) for k, j in enumerate(models.judged)}
         if not blamed and not any(missing.values()):
-            return models, inside, outside
+            return models, fit_residuals, held_out_residuals
         groups = [
             _without_addition(group, models.judged[k])
             if k in blamed
@@ -346,11 +356,11 @@ def _additions(judged: Judged) -> tuple[Term, ...]:
     return judged.named or (closure.effects if closure is not None else ())
 
 
-def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -> Models:
+def _models(nominal: Rig, fit_problem: Problem, judged: list[Judged], verdict: str) -> Models:
     """The rig at every stage, from the verdicts of the groups."""
-    refitted = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
+    refitted = _settled(nominal, fit_problem, judged, [j.group.candidates[0] for j in judged])
     baseline = _merged(nominal, refitted)
-    starts = _widened(fitted, judged, refitted)
+    starts = _widened(fit_problem, judged, refitted)
     if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
         final = nominal if verdict == "none" else baseline
         return Models(
@@ -364,8 +374,8 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
             verdict,
         )
     wanted = [_model_of(j, start) for j, start in zip(judged, refitted, strict=True)]
-    settled = _settled(nominal, fitted, judged, wanted)
-    chosen = _widened(fitted, judged, settled)
+    settled = _settled(nominal, fit_problem, judged, wanted)
+    chosen = _widened(fit_problem, judged, settled)
     judged = [
         replace(j, chosen=c) if j.named or j.wrong else j
         for j, c in zip(judged, chosen, strict=True)

@@ -431,14 +431,14 @@ def _select(
         if telling is None:
             break
         chosen.take(telling)
-        now, outside = chosen.misfit, crossed.left_out(order)
+        now, proof_now = chosen.misfit, crossed.left_out(order)
         here = frame.independent(chosen.left[: rows.size])
-        inner = here * math.log(misfit / max(now, 1e-300))
-        outer = here * math.log(proof / max(outside, 1e-300))
+        gain = here * math.log(misfit / max(now, 1e-300))
+        proven = here * math.log(proof / max(proof_now, 1e-300))
         new = len(order) - taken
         price = new * _price(here, len(candidates))
-        if outer > 0.0 and (inner > price or (outer > price and inner > new * math.log(here))):
-            taken, misfit, proof, samples = len(order), now, outside, here
+        if proven > 0.0 and (gain > price or (proven > price and gain > new * math.log(here))):
+            taken, misfit, proof, samples = len(order), now, proof_now, here
     pruned = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
     return _solved(frame, candidates, rows, unit, size, pruned) if pruned else None
 
@@ -596,7 +596,7 @@ def _fit_terms(
     """
     effects = tuple(dict.fromkeys(filter(None, map(effect_of, chosen.values))))
     every = {f"{e}.{p.name}": p for e in effects for p in e.info.parameters}
-    held = {
+    fixed = {
         n: 0.0 if p.neutral == 0.0 else p.default
         for n, p in every.items()
         if n not in chosen.values and n not in chosen.shapes
@@ -618,7 +618,7 @@ def _fit_terms(
                 effects,
                 starts,
                 inflation,
-                fixed=held,
+                fixed=fixed,
                 warm=replace(warm, values=shifted),
                 evaluations=evaluations,
             )

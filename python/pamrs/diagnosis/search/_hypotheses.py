@@ -131,7 +131,11 @@ Say = Callable[[str], None]
 
 
 def examine(
-    fitted: Problem, held: Problem, nominal: Rig, parts: list[list[Block]], say: Say
+    fit_problem: Problem,
+    held_out_problem: Problem,
+    nominal: Rig,
+    parts: list[list[Block]],
+    say: Say,
 ) -> list[BlockGroup]:
     """Refit the baseline of some blocks, locate what is left, and try every effect that acts there.
 
@@ -143,7 +147,7 @@ def examine(
 
     Parameters
     ----------
-    fitted, held : Problem
+    fit_problem, held_out_problem : Problem
         Recordings to fit and held-out ones (the same when there are no others).
     nominal : Rig
         Nominal model.
@@ -155,9 +159,9 @@ def examine(
     Returns
     -------
     list of BlockGroup
-        Without the blocks of a part whose judgement failed, which the losses of `fitted` tell.
+        Without the blocks of a part whose judgement failed, which the losses of `fit_problem` tell.
     """
-    losses, through = fitted.losses, (SimulationError,)
+    losses, through = fit_problem.losses, (SimulationError,)
 
     def tell_judged(blocks: Sequence[Block]) -> None:
         part = " and ".join(b.name for b in blocks)
@@ -165,7 +169,7 @@ def examine(
 
     def begin(blocks: list[Block]) -> Mismatch | OnlyNoise | None:
         what = f"the judgement of {' and '.join(b.name for b in blocks)}"
-        work = partial(_begin_part, fitted, held, nominal, blocks, say)
+        work = partial(_begin_part, fit_problem, held_out_problem, nominal, blocks, say)
         part = losses.part(what, work, through=through)
         if part is None:
             tell_judged(blocks)
@@ -177,9 +181,9 @@ def examine(
         others = [p for p in examined if isinstance(p, Mismatch) and p is not part]
         # where only noise is left nothing parts the names that are open elsewhere
         sure = others if isinstance(part, Mismatch) else [p for p in others if p.is_settled]
-        blocks = part.refit.trial.suspects if isinstance(part, Mismatch) else part.group.blocks
+        blocks = part.refit.attempts.suspects if isinstance(part, Mismatch) else part.group.blocks
         starts = [s for p in sure for s in p.leading if any(acts_in(s.effect, b) for b in blocks)]
-        names = " and ".join(b.name for b in part.refit.trial.inner.blocks)
+        names = " and ".join(b.name for b in part.refit.attempts.fit_problem.blocks)
         joined = losses.part(
             f"what other blocks name, tried in {names},",
             lambda: part.with_effects_of_others(starts) if starts else part,
@@ -188,7 +192,7 @@ def examine(
         )
         what = f"the judgement of {names}"
         groups = losses.part(what, lambda: joined.groups(say), [], through=through)
-        tell_judged(part.refit.trial.inner.blocks)
+        tell_judged(part.refit.attempts.fit_problem.blocks)
         return groups
 
     # two processors are kept busy by recordings and parts; threads of the linear algebra would only
@@ -198,15 +202,17 @@ def examine(
             examined = list(pool.map(begin, parts))
             return [group for groups in pool.map(end, examined) for group in groups]
         except BaseException:
-            fitted.stopped.set()
+            fit_problem.stopped.set()
             raise
 
 
 def _begin_part(
-    fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say
+    fit_problem: Problem, held_out_problem: Problem, nominal: Rig, blocks: list[Block], say: Say
 ) -> Mismatch | OnlyNoise:
     """Examine some blocks alone: a mismatch with its hypotheses, or a group that keeps noise."""
-    inner, outer = replace(fitted, blocks=blocks), replace(held, blocks=blocks)
+    fit_problem, held_out_problem = (
+        replace(problem, blocks=blocks) for problem in (fit_problem, held_out_problem)
+    )
     names = " and ".join(b.name for b in blocks)
 
     def tell(text: str) -> None:
@@ -214,26 +220,28 @@ def _begin_part(
         say(Line(f"{names}: {text}", line.share, part=names))
 
     tell(Line("refitting the baseline inside its tolerances", 0.0))
-    refit = _refit(inner, outer, nominal, same=held is fitted)
-    fitted_excess = refit.start.fitted
+    refit = _refit(fit_problem, held_out_problem, nominal)
+    fit_excess = refit.start.fit_excess
     if _is_marginal(refit) or not any(
-        significant(fitted_excess[b.name]) for b in refit.trial.suspects
+        significant(fit_excess[b.name]) for b in refit.attempts.suspects
     ):
         what = "the search for effects inside the error of the model"
-        smaller = inner.losses.part(
+        smaller = fit_problem.losses.part(
             what, lambda: _refit_with_smaller_curve_error(refit, tell), None
         )
         if smaller is not None:
             return _fit_hypotheses(smaller, tell)
     if refit.held_out_alone and not any(
-        significant(fitted_excess[b.name]) for b in refit.trial.suspects
+        significant(fit_excess[b.name]) for b in refit.attempts.suspects
     ):
         what = "the common fit of all recordings"
-        common = inner.losses.part(what, lambda: _fit_all_recordings(refit.trial, refit.start))
+        common = fit_problem.losses.part(
+            what, lambda: _fit_all_recordings(refit.attempts, refit.start)
+        )
         if common is not None:
             tell("one baseline leaves noise in all recordings")
             return OnlyNoise(refit, _healthy_group(refit, common), tell)
-    if refit.trial.suspects:
+    if refit.attempts.suspects:
         return _fit_hypotheses(refit, tell)
     return OnlyNoise(refit, refit.group([refit.start], {UNDECIDED: 1.0}, None), tell)
 
@@ -245,16 +253,16 @@ def _find_hidden_by_values(
     the logarithm of what it costs: values that the file may be wrong about and, if asked for,
     effects, which the values may have followed.
     """
-    trial, baseline = refit.trial, refit.start.fit
-    settings = trial.settings
+    attempts, baseline = refit.attempts, refit.start.fit
+    settings = attempts.settings
     if not effects:
-        freed = free_suspects(trial, baseline, baseline, tell, share=0.0)
+        freed = free_suspects(attempts, baseline, baseline, tell, share=0.0)
         return {c: price_of_wrong(c, settings) for c in freed}
     state = _screen_mismatch(refit, tell)
     singles = [*_fit_singles(state.search), *_fit_events(state.search, state.per_recording)]
     present = [c for c in singles if not is_absent(c, settings.most_tolerances)]
     near = state.search.heaviest_first(present)[: settings.most_polished]
-    ended = [trial.polish(c) if c in near else c for c in present]
+    ended = [attempts.polish(c) if c in near else c for c in present]
     return {c: price_of_wrong(c, settings) for c in state.mistaken} | {
         c: prior_loss(c, state.search.weighing) for c in ended
     }
@@ -266,7 +274,7 @@ class _Refit:
 
     Attributes
     ----------
-    trial : Attempts
+    attempts : Attempts
         Recordings, model, noise levels, and the blocks that keep an excess.
     white_fit : Fit
         The refit with white noise.
@@ -285,7 +293,7 @@ class _Refit:
         a share of that.
     """
 
-    trial: Attempts
+    attempts: Attempts
     white_fit: Fit
     inflation: dict[str, float]
     nominal_excess: dict[str, Excess]
@@ -297,13 +305,13 @@ class _Refit:
     @property
     def error_is_given(self) -> bool:
         """True where the size of the curve error is stated: by the rig file, or as none."""
-        return _error_is_given(self.trial.nominal, self.trial.settings)
+        return _error_is_given(self.attempts.nominal, self.attempts.settings)
 
     def with_smaller_error(self, candidates: list[FittedHypothesis]) -> _Refit | None:
         """Refit with the smaller curve error that the likeliest hypothesis leaves, or None."""
-        trial, (usual, sizes) = self.trial, self.error
-        each = [(c, *error_sizes(trial.inner, c.fit.residuals, usual)) for c in candidates]
-        _, sizes_left, _ = max(each, key=lambda one: one[2] - _price(one[0], trial))
+        attempts, (usual, sizes) = self.attempts, self.error
+        each = [(c, *error_sizes(attempts.fit_problem, c.fit.residuals, usual)) for c in candidates]
+        _, sizes_left, _ = max(each, key=lambda one: one[2] - _price(one[0], attempts))
         if all(sizes_left[name] > _CLEARLY_LESS * size for name, size in sizes.items()):
             return None
         return self.with_error_sizes(
@@ -312,10 +320,16 @@ class _Refit:
 
     def with_error_sizes(self, sizes: dict[str, float]) -> _Refit | None:
         """Refit with other sizes of the curve error; None where these leave no mismatch."""
-        trial = self.trial
-        inputs = trial.inner, trial.outer, trial.nominal, self.white_fit, self.nominal_residuals
-        refit = _refit_with_error_sizes(*inputs, (self.error[0], sizes), same=trial.same)
-        return refit if refit.trial.suspects else None
+        attempts = self.attempts
+        inputs = (
+            attempts.fit_problem,
+            attempts.held_out_problem,
+            attempts.nominal,
+            self.white_fit,
+            self.nominal_residuals,
+        )
+        refit = _refit_with_error_sizes(*inputs, (self.error[0], sizes))
+        return refit if refit.attempts.suspects else None
 
     def group(
         self,
@@ -324,34 +338,41 @@ class _Refit:
         mismatch: Block | None,
     ) -> BlockGroup:
         """The blocks as a group, with hypotheses and their probabilities."""
-        trial = self.trial
-        blocks, fitted_excess = trial.inner.blocks, candidates[0].fitted
+        attempts = self.attempts
+        blocks, fit_excess = attempts.fit_problem.blocks, candidates[0].fit_excess
         return BlockGroup(
             blocks,
             self.nominal_excess,
-            fitted_excess,
+            fit_excess,
             candidates,
             probabilities,
             mismatch,
-            trial.noise_level,
-            trial.suspects,
+            attempts.noise_level,
+            attempts.suspects,
         )
 
 
-def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refit:
+def _refit(fit_problem: Problem, held_out_problem: Problem, nominal: Rig) -> _Refit:
     """Fit parameters inside their tolerances, and find what each block keeps."""
-    blocks, settings = inner.blocks, inner.settings
-    nominal_residuals = residuals(inner, nominal)
-    white_fit = refitted(inner, nominal, no_inflation(blocks))
+    blocks, settings = fit_problem.blocks, fit_problem.settings
+    nominal_residuals = residuals(fit_problem, nominal)
+    white_fit = refitted(fit_problem, nominal, no_inflation(blocks))
     curve_errors = curve_errors_of(nominal, settings.usual_error)
-    noise_level = noise_levels(inner, core_rig(white_fit.rig, inner.core), curve_errors)
-    if not same:
-        noise_level |= noise_levels(outer, core_rig(white_fit.rig, outer.core), curve_errors)
+    noise_level = noise_levels(fit_problem, core_rig(white_fit.rig, fit_problem.core), curve_errors)
+    if held_out_problem.recordings is not fit_problem.recordings:
+        noise_level |= noise_levels(
+            held_out_problem, core_rig(white_fit.rig, held_out_problem.core), curve_errors
+        )
     usual, sizes = noise_level, dict.fromkeys((b.name for b in blocks), 1.0)
     if not _error_is_given(nominal, settings):
-        sizes, _ = error_sizes(inner, white_fit.residuals, usual)
+        sizes, _ = error_sizes(fit_problem, white_fit.residuals, usual)
     return _refit_with_error_sizes(
-        inner, outer, nominal, white_fit, nominal_residuals, (usual, sizes), same=same
+        fit_problem,
+        held_out_problem,
+        nominal,
+        white_fit,
+        nominal_residuals,
+        (usual, sizes),
     )
 
 
@@ -361,21 +382,19 @@ def _error_is_given(nominal: Rig, settings: DiagnosisSettings) -> bool:
 
 
 def _refit_with_error_sizes(
-    inner: Problem,
-    outer: Problem,
+    fit_problem: Problem,
+    held_out_problem: Problem,
     nominal: Rig,
     white_fit: Fit,
     nominal_residuals: dict[Key, Residual],
     error: tuple[dict[Key, NoiseLevel], dict[str, float]],
-    *,
-    same: bool,
 ) -> _Refit:
     """Refit with given sizes of the curve error: noise levels with it as stated or usual, and its
     size in each block as a share of that.
     """
-    blocks, settings = inner.blocks, inner.settings
-    noise_level = with_sizes(*error)
-    baseline, inflation = with_inflation(inner, nominal, white_fit, noise_level)
+    blocks, settings = fit_problem.blocks, fit_problem.settings
+    noise_level, same = with_sizes(*error), held_out_problem.recordings is fit_problem.recordings
+    baseline, inflation = with_inflation(fit_problem, nominal, white_fit, noise_level)
 
     def excess_by_block(
         problem: Problem, block_residuals: dict[Key, Residual]
@@ -385,14 +404,16 @@ def _refit_with_error_sizes(
             for b in blocks
         }
 
-    nominal_excess, fitted_excess = (
-        excess_by_block(inner, nominal_residuals),
-        excess_by_block(inner, baseline.residuals),
+    nominal_excess, fit_excess = (
+        excess_by_block(fit_problem, nominal_residuals),
+        excess_by_block(fit_problem, baseline.residuals),
     )
-    outside = (
-        predicted_by_others(inner, baseline, inflation) if same else residuals(outer, baseline.rig)
+    held_out_residuals = (
+        predicted_by_others(fit_problem, baseline, inflation)
+        if same
+        else residuals(held_out_problem, baseline.rig)
     )
-    held_out_excess = excess_by_block(outer, outside)
+    held_out_excess = excess_by_block(held_out_problem, held_out_residuals)
     # what parameters could not be told from the fitted recordings shows in the others alone, and is
     # no mismatch
 
@@ -401,61 +422,65 @@ def _refit_with_error_sizes(
             b
             for b in blocks
             if significant(excesses[b.name], _HELD_OUT_RATIO)
-            and fitted_excess[b.name].ratio > _FITTED_HINT
+            and fit_excess[b.name].ratio > _FITTED_HINT
             and not same
         ]
 
     apart = held_out_alone(held_out_excess)
-    if misses_only_held_out(fitted_excess, held_out_excess, same=same):
-        outside = predicted_with_doubt(outer, baseline)
-        held_out_excess = excess_by_block(outer, outside)
+    if misses_only_held_out(fit_excess, held_out_excess, same=same):
+        held_out_residuals = predicted_with_doubt(held_out_problem, baseline)
+        held_out_excess = excess_by_block(held_out_problem, held_out_residuals)
     apart_with_doubt = held_out_alone(held_out_excess)
-    suspects = [b for b in blocks if significant(fitted_excess[b.name]) or b in apart_with_doubt]
-    trial = Attempts(inner, outer, nominal, noise_level, held_out_excess, suspects)
-    likelihood = trial.likelihood_of(baseline.residuals, outside)
-    start = FittedHypothesis(
-        (), baseline, held_out_excess, fitted_excess, 0.0, likelihood=likelihood
+    suspects = [b for b in blocks if significant(fit_excess[b.name]) or b in apart_with_doubt]
+    attempts = Attempts(
+        fit_problem, held_out_problem, nominal, noise_level, held_out_excess, suspects
     )
+    likelihood = attempts.likelihood_of(baseline.residuals, held_out_residuals)
+    start = FittedHypothesis((), baseline, held_out_excess, fit_excess, 0.0, likelihood=likelihood)
     return _Refit(
-        trial, white_fit, inflation, nominal_excess, start, apart, nominal_residuals, error
+        attempts, white_fit, inflation, nominal_excess, start, apart, nominal_residuals, error
     )
 
 
-def _price(candidate: FittedHypothesis, trial: Attempts) -> float:
+def _price(candidate: FittedHypothesis, attempts: Attempts) -> float:
     """Log odds that the parameters of a hypothesis cost: their moves, and for each the half
     logarithm of the number of bins (Schwarz), which it could have fitted by chance.
     """
-    problem = trial.inner
+    problem = attempts.fit_problem
     bins = sum(p.n / bins_of(p) for p in problem.recordings) * len(problem.blocks)
     names = {n for n in candidate.fit.values if effect_of(n)} | {*candidate.wrong}
     events = candidate.fit.events.values.values() if candidate.fit.events else ()
     count = len(names) + sum(map(len, events))
     moved = sum(v * v for n, v in candidate.fit.moved.items() if n not in names)
-    terms = trial.settings.further_price * len(candidate.terms)
+    terms = attempts.settings.further_price * len(candidate.terms)
     return 0.5 * (moved + count * math.log(bins)) + terms
 
 
 def _healthy_group(refit: _Refit, common: FittedHypothesis) -> BlockGroup:
     """Group whose baseline, fitted to all recordings, leaves only noise in them."""
-    trial = refit.trial
+    attempts = refit.attempts
     # what the nominal model leaves in the held-out ones is what the parameters are moved for
-    quiet = residuals(trial.outer, trial.nominal)
+    quiet = residuals(attempts.held_out_problem, attempts.nominal)
     ever = {
         b.name: max(
-            refit.nominal_excess[b.name], trial.excess(b, trial.outer, quiet), key=lambda e: e.ratio
+            refit.nominal_excess[b.name],
+            attempts.excess(b, attempts.held_out_problem, quiet),
+            key=lambda e: e.ratio,
         )
-        for b in trial.inner.blocks
+        for b in attempts.fit_problem.blocks
     }
     return replace(refit.group([common], {UNDECIDED: 1.0}, None), nominal=ever, suspects=[])
 
 
-def _acting_effects(trial: Attempts) -> list[Term]:
+def _acting_effects(attempts: Attempts) -> list[Term]:
     """Effects of the catalogue that the rig can have, that it does not hold already and that act
     where an excess is left: everywhere, and at each place that the blocks tell apart.
     """
-    lacking = [e for e in CATALOGUE if e not in trial.held and fits(trial.nominal, e)]
-    terms = [term for e in lacking for term in trial.terms_of(e)]
-    return [term for term in terms if any(acts_in(term, b) for b in trial.suspects)]
+    lacking = [
+        e for e in CATALOGUE if e not in attempts.nominal_effects and fits(attempts.nominal, e)
+    ]
+    terms = [term for e in lacking for term in attempts.terms_of(e)]
+    return [term for term in terms if any(acts_in(term, b) for b in attempts.suspects)]
 
 
 def _refit_with_smaller_curve_error(refit: _Refit, tell: Say) -> _Refit | None:
@@ -478,7 +503,7 @@ def _refit_with_smaller_curve_error(refit: _Refit, tell: Say) -> _Refit | None:
         for start in _scaled_starts(best_of_each_kind(scores))
     ]
     baseline = state.search.start.fit
-    short_fits = two_at_a_time(lambda start: least.trial.fit_shortly([start], baseline), starts)
+    short_fits = two_at_a_time(lambda start: least.attempts.fit_shortly([start], baseline), starts)
     events = _fit_events(state.search, [*state.per_recording, *state.transient])
     singles = [*(c for c in short_fits if c is not None), *events, *state.mistaken]
     return refit.with_smaller_error([refit.start, *singles])
@@ -517,36 +542,47 @@ def _fit_hypotheses(refit: _Refit, tell: Say) -> Mismatch:
 
 def _screen_mismatch(refit: _Refit, tell: Say) -> _SearchState:
     """Screen a mismatch, and fit values that may be wrong."""
-    trial, start = refit.trial, refit.start
-    suspects, now = trial.suspects, start.fitted
-    mismatch = max(suspects, key=lambda b: trial.held_out[b.name].ratio + now[b.name].ratio)
+    attempts, start = refit.attempts, refit.start
+    suspects, now = attempts.suspects, start.fit_excess
+    mismatch = max(
+        suspects, key=lambda b: attempts.baseline_excess[b.name].ratio + now[b.name].ratio
+    )
     size = f"{now[mismatch.name].systematic:.2g} noise levels"
     tell(Line(f"after the refit the residual of {mismatch.name} is {size}", _REFIT_SHARE))
-    acting = _acting_effects(trial)
+    acting = _acting_effects(attempts)
     # events of free times would always mend a noise level that was estimated too low
     transient_everywhere = [e for e in acting if not e.at and e.info.transient and not e.info.own]
     transient = [] if _is_marginal(refit) else transient_everywhere
     # gauges do not drift together
-    per_recording = [e for e in acting if e.info.own and (e.at or len(trial.terms_of(e.id)) == 1)]
+    per_recording = [
+        e for e in acting if e.info.own and (e.at or len(attempts.terms_of(e.id)) == 1)
+    ]
     persistent = [e for e in acting if e.info.lasting]
-    part = trial.inner.losses.part
+    part = attempts.fit_problem.losses.part
     mistaken = part(
         "the search for wrong values",
-        lambda: free_suspects(trial, start.fit, refit.white_fit, tell),
+        lambda: free_suspects(attempts, start.fit, refit.white_fit, tell),
         [],
     )
-    sealed = trial.nominal.model["valve"] is None
+    sealed = attempts.nominal.model["valve"] is None
     # by the noise of the sensors, whatever curve error there is
-    strong = far_above_noise(trial, start)
+    strong = far_above_noise(attempts, start)
     screened = screen(
-        trial.inner, start.fit, persistent, trial.no_inflation, sealed=sealed, strong=strong
+        attempts.fit_problem,
+        start.fit,
+        persistent,
+        attempts.no_inflation,
+        sealed=sealed,
+        strong=strong,
     )
     weighing = Weighing(
-        probability_cap(trial.inner, mismatch, now[mismatch.name].rms, alone=trial.same and sealed),
-        max(p.n * p.dt for p in trial.inner.recordings),
-        trial.settings,
+        probability_cap(
+            attempts.fit_problem, mismatch, now[mismatch.name].rms, alone=attempts.same and sealed
+        ),
+        max(p.n * p.dt for p in attempts.fit_problem.recordings),
+        attempts.settings,
     )
-    search = Search(trial, screened, start, weighing, tell)
+    search = Search(attempts, screened, start, weighing, tell)
     return _SearchState(search, mismatch, mistaken, per_recording, transient)
 
 
@@ -577,23 +613,23 @@ class Mismatch:
     @property
     def is_settled(self) -> bool:
         """True where one hypothesis is so probable that no other is left open."""
-        return max(self.weighed.values()) > self.refit.trial.settings.settled
+        return max(self.weighed.values()) > self.refit.attempts.settings.settled
 
     @property
     def leading(self) -> list[Start]:
         """The lasting effects of the hypothesis that leads, as they were fitted; none where nothing
         is as probable as what has no name.
         """
-        trial, named = self.refit.trial, [c for c in self.candidates if c.terms]
+        attempts, named = self.refit.attempts, [c for c in self.candidates if c.terms]
         best = max(named, key=lambda c: _probability(self.weighed, c), default=None)
         if best is None or _probability(self.weighed, best) <= self.weighed.get(UNLISTED, 0.0):
             return []
         lasting = best.fit.events is None
-        return trial.starts_of(best) if lasting else []
+        return attempts.starts_of(best) if lasting else []
 
     def with_effects_of_others(self, starts: list[Start]) -> Mismatch:
         """Try the effects that other blocks name here too, alone and with what leads here."""
-        trial, start = self.refit.trial, self.candidates[0]
+        attempts, start = self.refit.attempts, self.candidates[0]
         self.search.tell(
             f"trying {', '.join(str(s.effect) for s in starts)}, which other blocks have"
         )
@@ -601,12 +637,12 @@ class Mismatch:
         best = max(named, key=lambda c: _probability(self.weighed, c), default=None)
         fitted: list[FittedHypothesis] = []
         for one in starts:
-            alone = trial.fit_effects([one], start.fit, trial.no_inflation)
+            alone = attempts.fit_effects([one], start.fit, attempts.no_inflation)
             if alone is None or not _is_visible(alone, one):
                 continue  # a clock that is late by the same for all that a block sees
             fitted.append(alone)
             if best is not None and not one.effect.excluded_by(best.effects):
-                both = trial.fit_together([*trial.starts_of(best), one], best.fit, best.wrong)
+                both = attempts.fit_together([*attempts.starts_of(best), one], best.fit, best.wrong)
                 fitted += [] if both is None else [both]
         candidates = _best_of_each([*self.candidates, *fitted])
         candidates, weighed = _weigh_to_the_end(self.search, candidates)
@@ -615,8 +651,8 @@ class Mismatch:
     def groups(self, say: Say) -> list[BlockGroup]:
         """The blocks as one group, or in parts where names explain parts of them."""
         refit, weighed = self.refit, self.weighed
-        now = refit.start.fitted[self.block.name]
-        part = refit.trial.inner.losses.part
+        now = refit.start.fit_excess[self.block.name]
+        part = refit.attempts.fit_problem.losses.part
         screened = self.search.screened
         # of the chi-square that is left noise has its part
         share = 1.0 - 1.0 / max(now.ratio, 1.0 + _MARGINAL_EXCESS)
@@ -630,7 +666,7 @@ class Mismatch:
         if _leading(weighed) == UNLISTED:
             what = "the division of the blocks by their names"
             parts = part(
-                what, lambda: _split_by_names(group, refit.trial, self.search.weighing), []
+                what, lambda: _split_by_names(group, refit.attempts, self.search.weighing), []
             )
             if parts:
                 return parts
@@ -664,16 +700,16 @@ class OnlyNoise:
         recordings and values are as probable with it, at the values that it has in the other
         blocks.
         """
-        trial = replace(self.refit.trial, suspects=self.group.blocks)
+        attempts = replace(self.refit.attempts, suspects=self.group.blocks)
         baseline = self.group.candidates[0]
         if baseline is not self.refit.start:
             return self  # one fit of all recordings: no hypothesis is compared with it
         consistent = []
         for start in starts:
-            # held first: what the baseline hid it by has to let go of it
-            known = replace(start, free={}, held=start.held | start.free)
-            first = trial.fit_effects([known], baseline.fit, trial.no_inflation)
-            both = first and trial.fit_effects([start], first.fit, trial.no_inflation)
+            # fixed first: what the baseline hid it by has to let go of it
+            known = replace(start, free={}, fixed=start.fixed | start.free)
+            first = attempts.fit_effects([known], baseline.fit, attempts.no_inflation)
+            both = first and attempts.fit_effects([start], first.fit, attempts.no_inflation)
             if both and _is_visible(both, start):
                 joint = both.fit
                 alike = (are_alike(joint.values[n], v, joint.std[n]) for n, v in start.free.items())
@@ -688,10 +724,10 @@ class OnlyNoise:
         if baseline is not refit.start:
             return [self.group]
         with_effects = all(is_unlikely(c.fit) for c in (baseline, *self.shared))
-        whole = replace(refit, trial=replace(refit.trial, suspects=self.group.blocks))
+        whole = replace(refit, attempts=replace(refit.attempts, suspects=self.group.blocks))
         work = partial(_find_hidden_by_values, whole, self.tell, effects=with_effects)
         what = "the search for what moved values explain"
-        prices = refit.trial.inner.losses.part(what, work, {})
+        prices = refit.attempts.fit_problem.losses.part(what, work, {})
         # what is there once is paid for once: the odds of both places are given for both
         prices |= dict.fromkeys(self.shared, math.log(SHARED_ODDS))
         return [weigh_only_noise(self.group, prices)]
@@ -704,10 +740,10 @@ def _leading(weighed: Mapping[Hypothesis, float]) -> Hypothesis:
 
 def _is_marginal(refit: _Refit) -> bool:
     """True where so little is left that the noise level may as well have been estimated too low."""
-    excesses = (refit.start.fitted, refit.trial.held_out)
+    excesses = (refit.start.fit_excess, refit.attempts.baseline_excess)
     return all(
         e.ratio - 1.0 < max(_MARGINAL_MULTIPLE * (e.limit - 1.0), _MARGINAL_EXCESS)
-        for b in refit.trial.suspects
+        for b in refit.attempts.suspects
         for e in (excess_by_block[b.name] for excess_by_block in excesses)
     )
 
@@ -730,19 +766,19 @@ def _fit_candidates(
     that are wrong. ``per_recording`` and ``transient`` are effects with sizes, and with times, of
     their own in each recording.
     """
-    trial, start, alone = search.trial, search.start, search.weight
+    attempts, start, alone = search.attempts, search.start, search.weight
     singles = _fit_singles(search)
-    part = trial.inner.losses.part
+    part = attempts.fit_problem.losses.part
     what = "the effects that are the same data as others"
     singles = part(what, lambda: _add_same_data(search, singles), singles)
     singles += _fit_events(search, per_recording)
-    if transient and not any(cannot_gain(c, trial) for c in (*singles, *mistaken)):
+    if transient and not any(cannot_gain(c, attempts) for c in (*singles, *mistaken)):
         search.tell(
             f"looking for what happens at times of its own ({', '.join(map(str, transient))})"
         )
         singles += _fit_events(search, transient)
         singles = _best_of_each(singles)
-    if any(settles(c, trial, start) for c in (*singles, *mistaken)):
+    if any(settles(c, attempts, start) for c in (*singles, *mistaken)):
         lasting = sorted((c for c in singles if c.fit.events is None), key=log_misfit)
 
         def more() -> list[FittedHypothesis]:
@@ -757,7 +793,7 @@ def _fit_candidates(
 
 def _fit_events(search: Search, effects: list[Term]) -> list[FittedHypothesis]:
     """Effects with sizes or times of their own in each recording, each by itself."""
-    candidates = (search.trial.fit_events(effect, search.start) for effect in effects)
+    candidates = (search.attempts.fit_events(effect, search.start) for effect in effects)
     return [c for c in candidates if c is not None]
 
 
@@ -780,17 +816,17 @@ def _weigh_to_the_end(
     search: Search, candidates: list[FittedHypothesis]
 ) -> tuple[list[FittedHypothesis], dict[Hypothesis, float]]:
     """Hypotheses with their probabilities, those that are close fitted to the end first."""
-    start, trial, settings = candidates[0], search.trial, search.trial.settings
+    start, attempts, settings = candidates[0], search.attempts, search.attempts.settings
 
     def weights(sets: list[FittedHypothesis]) -> dict[Hypothesis, float]:
-        return weigh(sets, trial.compared, search.weighing)
+        return weigh(sets, attempts.compared, search.weighing)
 
     probabilities = weights(candidates)
     likely = [c for c in candidates[1:] if _probability(probabilities, c) > _POLISH_FROM]
     close = sorted(likely, key=lambda c: -_probability(probabilities, c))[: settings.most_polished]
-    if len(close) > 1 or (close and not explains(close[0], start, trial.compared)):
+    if len(close) > 1 or (close and not explains(close[0], start, attempts.compared)):
         search.tell("fitting to the end " + ", ".join(str(c.hypothesis) for c in close))
-        polished = [trial.polish(c) if c in close else c for c in candidates]
+        polished = [attempts.polish(c) if c in close else c for c in candidates]
         # what came back inside its tolerances on the way to the end is not wrong
         candidates = [c for c in polished if c.is_wrong(settings.most_tolerances)]
         probabilities = weights(candidates)
@@ -799,9 +835,9 @@ def _weigh_to_the_end(
 
 def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGroup:
     """Add a form of what is missing to a group, where no name is likely and a form carries over."""
-    trial, start = refit.trial, refit.start
+    attempts, start = refit.attempts, refit.start
     # what is missing in a chamber is missing in the temperature of its gas too
-    suspects = [b for b in trial.suspects if "chamber" not in b.beside] or trial.suspects
+    suspects = [b for b in attempts.suspects if "chamber" not in b.beside] or attempts.suspects
     if group.probabilities[UNLISTED] < _FROM_PROBABILITY or len({b.kind for b in suspects}) < len(
         suspects
     ):
@@ -814,18 +850,18 @@ def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGro
         return group
     group = replace(group, sought=True)
     closed = find_closure(
-        trial.inner,
-        trial.nominal,
+        attempts.fit_problem,
+        attempts.nominal,
         start.fit,
         refit.inflation,
         suspects,
         say,
-        trial.noise_level,
+        attempts.noise_level,
     )
     if closed is None:
         return group
     try:
-        assessed = trial.assess(closed.effects, closed)
+        assessed = attempts.assess(closed.effects, closed)
     except SimulationError:
         return group
     # what does not carry over to recordings that were held out is no form of anything
@@ -834,7 +870,7 @@ def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGro
     return replace(group, closure=assessed)
 
 
-def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> list[BlockGroup]:
+def _split_by_names(group: BlockGroup, attempts: Attempts, weighing: Weighing) -> list[BlockGroup]:
     """A group in parts, where a name explains a block in which alone it acts; else nothing.
 
     A leak of the tank is seen in the tank's pressure, whatever the chamber behind the valve keeps
@@ -867,7 +903,7 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
         )
         for b in named
     ]
-    common = best[0].fit if len(best) == 1 else trial.fit_united(best)
+    common = best[0].fit if len(best) == 1 else attempts.fit_united(best)
     if common is None:
         return []
     start = replace(start, fit=common)
@@ -888,7 +924,8 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
             ],
             probabilities=probabilities,
             mismatch=max(
-                suspects, key=lambda b: start.held_out[b.name].ratio + start.fitted[b.name].ratio
+                suspects,
+                key=lambda b: start.held_out_excess[b.name].ratio + start.fit_excess[b.name].ratio,
             ),
             suspects=suspects,
             predicted_gain={
@@ -911,29 +948,29 @@ def _probability(weighed: dict[Hypothesis, float], candidate: FittedHypothesis) 
     return weighed.get(candidate.hypothesis, 0.0)
 
 
-def _fit_all_recordings(trial: Attempts, start: FittedHypothesis) -> FittedHypothesis | None:
+def _fit_all_recordings(attempts: Attempts, start: FittedHypothesis) -> FittedHypothesis | None:
     """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings,
     taken together, if there is one.
     """
-    inner, outer = trial.inner, trial.outer
-    both = replace(inner, recordings=[*inner.recordings, *outer.recordings])
+    fit_problem, held_out_problem = attempts.fit_problem, attempts.held_out_problem
+    both = replace(fit_problem, recordings=[*fit_problem.recordings, *held_out_problem.recordings])
     try:
-        common = thorough(both, trial.nominal, trial.no_inflation, start.fit)
+        common = thorough(both, attempts.nominal, attempts.no_inflation, start.fit)
     except SimulationError:
         return None
     fitted, held_out = (
-        {b.name: trial.excess(b, part, common.residuals) for b in inner.blocks}
-        for part in (inner, outer)
+        {b.name: attempts.excess(b, part, common.residuals) for b in fit_problem.blocks}
+        for part in (fit_problem, held_out_problem)
     )
-    if any(significant(e[b.name]) for b in inner.blocks for e in (fitted, held_out)):
+    if any(significant(e[b.name]) for b in fit_problem.blocks for e in (fitted, held_out)):
         return None
     return FittedHypothesis((), common, held_out, fitted, 0.0)
 
 
 def _fit_singles(search: Search) -> list[FittedHypothesis]:
     """The effects that the screen finds worth it, fitted; the most telling first."""
-    trial, screened, baseline = search.trial, search.screened, search.start.fit
-    settings = trial.settings
+    attempts, screened, baseline = search.attempts, search.screened, search.start.fit
+    settings = attempts.settings
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
@@ -959,13 +996,13 @@ def _fit_singles(search: Search) -> list[FittedHypothesis]:
                 )
     singles = []
     for effect in chosen:
-        attempts = two_at_a_time(
+        from_starts = two_at_a_time(
             lambda start: _fit_effect(
-                trial, start, baseline, short.get((start.effect, start.form))
+                attempts, start, baseline, short.get((start.effect, start.form))
             ),
             near[effect],
         )
-        fitted = [candidate for candidate in attempts if candidate is not None]
+        fitted = [candidate for candidate in from_starts if candidate is not None]
         if fitted:
             singles.append(
                 replace(_first_of_equal_forms(fitted, FORM_SHARE_ALIKE), gain=gains[effect])
@@ -974,15 +1011,15 @@ def _fit_singles(search: Search) -> list[FittedHypothesis]:
 
 
 def _fit_effect(
-    trial: Attempts, start: Start, baseline: Fit, short: FittedHypothesis | None
+    attempts: Attempts, start: Start, baseline: Fit, short: FittedHypothesis | None
 ) -> FittedHypothesis | None:
     """Fit an effect from a start with the baseline; where a few steps to the same start had left
     less, from where these had moved the baseline too.
     """
-    direct = trial.fit_effects([start], baseline, trial.no_inflation)
+    direct = attempts.fit_effects([start], baseline, attempts.no_inflation)
     if short is None or (direct is not None and direct.misfit <= short.misfit):
         return direct
-    from_short = trial.fit_effects([start], short.fit, trial.no_inflation)
+    from_short = attempts.fit_effects([start], short.fit, attempts.no_inflation)
     both = [c for c in (direct, from_short) if c is not None]
     return min(both, key=lambda c: c.misfit, default=None)
 
@@ -1008,13 +1045,13 @@ def _shortlist(
     effects that came to nothing in every form are left, and those that then lead get a few steps
     from all their other starts.
     """
-    trial, weight, baseline = search.trial, search.weight, search.start.fit
-    settings = trial.settings
+    attempts, weight, baseline = search.attempts, search.weight, search.start.fit
+    settings = attempts.settings
     short: dict[Term, list[FittedHypothesis]] = {}
 
     def begin(starts: dict[Term, list[Start]]) -> None:
         tasks = [(e, start) for e, of_effect in starts.items() for start in of_effect]
-        short_fits = two_at_a_time(lambda one: trial.fit_shortly([one[1]], baseline), tasks)
+        short_fits = two_at_a_time(lambda one: attempts.fit_shortly([one[1]], baseline), tasks)
         for effect in starts:
             of_effect = [c for (e, _), c in zip(tasks, short_fits, strict=True) if e == effect]
             known = [*short.get(effect, []), *(c for c in of_effect if c is not None)]
@@ -1056,7 +1093,7 @@ def _shortlist(
             forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
             best_forms = sorted(forms.values(), key=weight, reverse=True)
             count = _MOST_FORMS if leads else 1
-            starts[effect] = [trial.start_of(c.fit, effect) for c in best_forms[:count]]
+            starts[effect] = [attempts.start_of(c.fit, effect) for c in best_forms[:count]]
             ends |= {(effect, form_in(c.fit.rig, effect)): c for c in best_forms[:count]}
             best.append(effect)
     return best, starts, ends
@@ -1097,13 +1134,13 @@ def _add_same_data(search: Search, singles: list[FittedHypothesis]) -> list[Fitt
     """Single effects, and for each that may leave the same data as another effect (a late clock and
     a dead time) that other one.
     """
-    trial, start, left_by = search.trial, search.start, search.share_left
+    attempts, start, left_by = search.attempts, search.start, search.share_left
     single_of = {c.effects: c for c in singles}
 
     def wanted(effect: Term, shaped: FittedHypothesis) -> bool:
         """True where an effect was not fitted, or only in a form that leaves clearly more."""
         fitted = single_of.get((effect,))
-        return fits(trial.nominal, effect.id) and (
+        return fits(attempts.nominal, effect.id) and (
             fitted is None or left_by(fitted) > left_by(shaped) + FORM_SHARE_ALIKE
         )
 
@@ -1111,16 +1148,18 @@ def _add_same_data(search: Search, singles: list[FittedHypothesis]) -> list[Fitt
     others: list[FittedHypothesis | None] = []
     for single in singles:
         (effect,) = single.effects
-        same = same_data_in(trial.nominal, effect)
+        same = same_data_in(attempts.nominal, effect)
         shaped = single if same is None else _in_shape(search, single, same)
         all_shaped.append(shaped)
         if same is not None and same_recordings(shaped, effect, search.weighing.seconds):
             others += (
-                [_as_other(trial, start, shaped, same)] if wanted(Term(same.effect), shaped) else []
+                [_as_other(attempts, start, shaped, same)]
+                if wanted(Term(same.effect), shaped)
+                else []
             )
-        twins = ((twin, same_data_in(trial.nominal, twin)) for twin in map(Term, CATALOGUE))
+        twins = ((twin, same_data_in(attempts.nominal, twin)) for twin in map(Term, CATALOGUE))
         others += [
-            _as_twin(trial, start, shaped, twin, same)
+            _as_twin(attempts, start, shaped, twin, same)
             for twin, same in twins
             if same is not None and Term(same.effect) == effect and wanted(twin, shaped)
         ]
@@ -1131,13 +1170,13 @@ def _in_shape(search: Search, single: FittedHypothesis, same: SameData) -> Fitte
     """An effect in the shape in which it is the same data as another one, where it explains as much
     in it.
     """
-    trial = search.trial
-    start = trial.start_of(single.fit, single.effects[0])
-    held = {f"{start.effect}.{name}": value for name, value in same.held}
-    if all(start.held[name] == value for name, value in held.items()):
+    attempts = search.attempts
+    start = attempts.start_of(single.fit, single.effects[0])
+    fixed = {f"{start.effect}.{name}": value for name, value in same.held}
+    if all(start.fixed[name] == value for name, value in fixed.items()):
         return single
-    alike = trial.fit_effects(
-        [replace(start, held=start.held | held)], search.start.fit, trial.no_inflation
+    alike = attempts.fit_effects(
+        [replace(start, fixed=start.fixed | fixed)], search.start.fit, attempts.no_inflation
     )
     if alike is None:
         return single
@@ -1146,24 +1185,32 @@ def _in_shape(search: Search, single: FittedHypothesis, same: SameData) -> Fitte
 
 
 def _as_other(
-    trial: Attempts, start: FittedHypothesis, single: FittedHypothesis, same: SameData
+    attempts: Attempts, start: FittedHypothesis, single: FittedHypothesis, same: SameData
 ) -> FittedHypothesis | None:
     """The other effect, as large as this one, where the two leave the same recordings."""
     parameters = EFFECTS[same.effect].form(same.form).parameters
     usual = {f"{same.effect}.{p.name}": p.default for p in parameters}
     usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{single.effects[0]}.{same.size}"]
-    return trial.fit_effects(
-        [Start(Term(same.effect), usual, {}, (), False, same.form)], start.fit, trial.no_inflation
+    return attempts.fit_effects(
+        [Start(Term(same.effect), usual, {}, (), False, same.form)],
+        start.fit,
+        attempts.no_inflation,
     )
 
 
 def _as_twin(
-    trial: Attempts, start: FittedHypothesis, single: FittedHypothesis, twin: Term, same: SameData
+    attempts: Attempts,
+    start: FittedHypothesis,
+    single: FittedHypothesis,
+    twin: Term,
+    same: SameData,
 ) -> FittedHypothesis | None:
     """The effect that leaves the same recordings as this one, where this one has a size."""
     size = single.fit.values.get(f"{same.effect}.{same.parameter}", 0.0)
     if size <= 0.0:
         return None
     free = {f"{twin}.{same.size}": size, f"{twin}.{same.without}": 0.0}
-    held = {f"{twin}.{name}": value for name, value in same.held}
-    return trial.fit_effects([Start(twin, free, held, (), False)], start.fit, trial.no_inflation)
+    fixed = {f"{twin}.{name}": value for name, value in same.held}
+    return attempts.fit_effects(
+        [Start(twin, free, fixed, (), False)], start.fit, attempts.no_inflation
+    )

@@ -116,7 +116,7 @@ def _kind(name: str) -> str:
 
 
 def free_suspects(
-    trial: Attempts,
+    attempts: Attempts,
     baseline: Fit,
     first: Fit,
     say: Callable[[str], None],
@@ -131,7 +131,7 @@ def free_suspects(
 
     Parameters
     ----------
-    trial : Attempts
+    attempts : Attempts
         Recordings, model, noise levels.
     baseline : Fit
         The refitted baseline, with sensitivities.
@@ -143,13 +143,13 @@ def free_suspects(
         Of the sum of squares, below which a step is not worth it; 0 where the last few units of
         chi-square count.
     """
-    walls = trial.settings.most_tolerances
+    walls = attempts.settings.most_tolerances
     suspects = [
         names
         for freed in (baseline, first)
-        for names in suspected_values(freed, trial.inner.blocks)
+        for names in suspected_values(freed, attempts.fit_problem.blocks)
     ]
-    gains = _worth_a_fit(trial, baseline, list(dict.fromkeys(suspects)), trial.no_inflation)
+    gains = _worth_a_fit(attempts, baseline, list(dict.fromkeys(suspects)), attempts.no_inflation)
     # the linear model says little of what is far away: each parameter is fitted, whatever its
     # predicted gain beside others
     least = _PAIR_SHARE * max(gains.values(), default=0.0)
@@ -158,19 +158,19 @@ def free_suspects(
     ]
     freed = []
     sets = [names for names in gains if len(names) == 1 or names in pairs]
-    for names, candidate in _fit_freed(trial, sets, baseline, say, share).items():
+    for names, candidate in _fit_freed(attempts, sets, baseline, say, share).items():
         if candidate is not None and candidate.is_wrong(walls):
             freed.append(replace(candidate, gain=gains[names]))
     return freed
 
 
-def far_parameters(trial: Attempts, fitted: Fit) -> list[str]:
+def far_parameters(attempts: Attempts, fitted: Fit) -> list[str]:
     """Parameters that a fit with effects moved far, and whose freeing promises most by the linear
     model; the most promising first.
 
     Parameters
     ----------
-    trial : Attempts
+    attempts : Attempts
         Recordings, model, noise levels.
     fitted : Fit
         A fit with effects.
@@ -178,17 +178,17 @@ def far_parameters(trial: Attempts, fitted: Fit) -> list[str]:
     far: list[tuple[str, ...]] = [
         (name,) for name, moved in fitted.moved.items() if abs(moved) >= _FAR_TOLERANCES
     ]
-    gains = _worth_a_fit(trial, fitted, far, trial.inflation_of(fitted))
+    gains = _worth_a_fit(attempts, fitted, far, attempts.inflation_of(fitted))
     return [name for (name,) in gains][:_MOST_BESIDE]
 
 
 def _worth_a_fit(
-    trial: Attempts, fitted: Fit, sets: list[tuple[str, ...]], inflation: dict[str, float]
+    attempts: Attempts, fitted: Fit, sets: list[tuple[str, ...]], inflation: dict[str, float]
 ) -> dict[tuple[str, ...], float]:
     """Sets of parameters whose freeing is worth a fit by the linear model, with their gain in
     chi-square, the largest first.
     """
-    gains = _predicted_gain(trial.inner, trial.nominal, fitted, sets, inflation)
+    gains = _predicted_gain(attempts.fit_problem, attempts.nominal, fitted, sets, inflation)
     return {
         n: gains[n]
         for n in sorted(gains, key=lambda n: -gains[n])
@@ -197,7 +197,7 @@ def _worth_a_fit(
 
 
 def _fit_freed(
-    trial: Attempts,
+    attempts: Attempts,
     sets: list[tuple[str, ...]],
     baseline: Fit,
     say: Callable[[str], None],
@@ -210,17 +210,17 @@ def _fit_freed(
     def to_the_end(
         several: list[tuple[str, ...]],
     ) -> dict[tuple[str, ...], FittedHypothesis | None]:
-        ended = two_at_a_time(lambda names: trial.fit_freed(names, baseline, share), several)
+        ended = two_at_a_time(lambda names: attempts.fit_freed(names, baseline, share), several)
         return dict(zip(several, ended, strict=True))
 
     if len(sets) <= _MOST_FINISHED:
         return to_the_end(sets)
     say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
-    attempts = zip(sets, two_at_a_time(trial.fit_freed_shortly, sets), strict=True)
-    short = {names: c for names, c in attempts if c is not None}
-    worth = [names for names in short if not _needless(names, short, trial)]
+    short_fits = zip(sets, two_at_a_time(attempts.fit_freed_shortly, sets), strict=True)
+    short = {names: c for names, c in short_fits if c is not None}
+    worth = [names for names in short if not _needless(names, short, attempts)]
     best = sorted(worth, key=lambda names: short[names].misfit)[:_MOST_FINISHED]
-    if best and not any(significant(e) for e in short[best[0]].fitted.values()):
+    if best and not any(significant(e) for e in short[best[0]].fit_excess.values()):
         # what leaves much more than one that leaves noise does not get there
         near = _NEAR_MISFIT * short[best[0]].misfit
         best = [names for names in best if short[names].misfit <= near]
@@ -228,7 +228,7 @@ def _fit_freed(
 
 
 def _needless(
-    names: tuple[str, ...], short: Mapping[tuple[str, ...], FittedHypothesis], trial: Attempts
+    names: tuple[str, ...], short: Mapping[tuple[str, ...], FittedHypothesis], attempts: Attempts
 ) -> bool:
     """True where one of several parameters, freed alone, leaves nearly as little."""
     alone = [short[name,].misfit for name in names if (name,) in short] if len(names) > 1 else []
@@ -289,8 +289,8 @@ def price_of_wrong(candidate: FittedHypothesis, settings: DiagnosisSettings) -> 
     """Logarithm of what wrong values cost where the baseline explains all: a file that is further
     outside its tolerances is rarer, but less and less so.
     """
-    outside = candidate.outside(settings.most_tolerances)
-    return settings.file_log_odds * len(candidate.wrong) + outside
+    beyond = candidate.beyond_walls(settings.most_tolerances)
+    return settings.file_log_odds * len(candidate.wrong) + beyond
 
 
 def weigh_only_noise(quiet: BlockGroup, prices: Mapping[FittedHypothesis, float]) -> BlockGroup:
@@ -301,7 +301,7 @@ def weigh_only_noise(quiet: BlockGroup, prices: Mapping[FittedHypothesis, float]
     scores = {
         c: _plausibility(c) - _plausibility(start) - price
         for c, price in prices.items()
-        if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)
+        if not any(significant(e) for e in c.fit_excess.values()) and _carries_over(c, start)
     }
     top, undecided = max(0.0, *scores.values(), 0.0), quiet.probabilities[UNDECIDED]
     weights = {c.hypothesis: undecided * math.exp(score - top) for c, score in scores.items()}
@@ -319,5 +319,5 @@ def _plausibility(candidate: FittedHypothesis) -> float:
 
 def _carries_over(candidate: FittedHypothesis, start: FittedHypothesis) -> bool:
     """True where held-out recordings are predicted as well as by the baseline, or to noise."""
-    pairs = [(candidate.held_out[name], was) for name, was in start.held_out.items()]
+    pairs = [(candidate.held_out_excess[name], was) for name, was in start.held_out_excess.items()]
     return all(now.ratio <= max(now.limit, was.ratio) for now, was in pairs)
