@@ -275,7 +275,7 @@ def test_inside_the_error_of_the_model_effects_get_a_few_steps(
     ]
     screened = SimpleNamespace(strong=strong, scores=lambda: scores)
     search = SimpleNamespace(screened=screened, start=SimpleNamespace(fit=None))
-    state = SimpleNamespace(search=search, per_recording=[], transient=[], mistaken=["wrong"])
+    state = SimpleNamespace(search=search, per_recording=[], transient=[], wrong_values=["wrong"])
     monkeypatch.setattr(_hypotheses, "_screen_mismatch", lambda refit, tell: state)
     shortly = SimpleNamespace(fit_shortly=lambda starts, _: starts[0].effect.id)
     refit = SimpleNamespace(

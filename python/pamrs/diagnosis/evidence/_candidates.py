@@ -209,13 +209,13 @@ def significant(excess_of_block: Excess, ratio: float = 1.0) -> bool:
 
 
 def misses_only_held_out(
-    fit_excess: dict[str, Excess], held_out_excess: dict[str, Excess], *, same: bool
+    fit_excess: dict[str, Excess], held_out_excess: dict[str, Excess], *, nothing_held_out: bool
 ) -> bool:
     """True where a fit leaves noise in its own recordings and more in held-out ones: parameters
     that its own recordings do not determine may bring that (docs/decisions/0111).
     """
     quiet = not any(significant(e) for e in fit_excess.values())
-    return not same and quiet and any(significant(e) for e in held_out_excess.values())
+    return not nothing_held_out and quiet and any(significant(e) for e in held_out_excess.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +268,7 @@ class Attempts:
     @cached_property
     def likelihood(self) -> Likelihood:
         """Likelihood of what a hypothesis leaves of all recordings, fitted and held out."""
-        held_out = [] if self.same else self.held_out_problem.recordings
+        held_out = [] if self.nothing_held_out else self.held_out_problem.recordings
         recordings = [*self.fit_problem.recordings, *held_out]
         return Likelihood(self.fit_problem.blocks, recordings, self.noise_level)
 
@@ -280,11 +280,11 @@ class Attempts:
         Where no recording is held out it is that of the fitted residuals: what others predict of
         each recording does not enter.
         """
-        every = fit_residuals if self.same else {**fit_residuals, **held_out_residuals}
+        every = fit_residuals if self.nothing_held_out else {**fit_residuals, **held_out_residuals}
         return cache(partial(self.likelihood.of, every))
 
     @property
-    def same(self) -> bool:
+    def nothing_held_out(self) -> bool:
         """True where no recording is held out."""
         return self.held_out_problem.recordings is self.fit_problem.recordings
 
@@ -320,7 +320,7 @@ class Attempts:
         if beside.effects:
             fitted = self._refit_around_events(fitted, beside, no_inflation)
         effects = (*beside.effects, effect)
-        if self.same:
+        if self.nothing_held_out:
             return self.assess(effects, fitted)
         bare = without_term(fitted.rig, effect)
         quiet = residuals(self.held_out_problem, bare)
@@ -387,14 +387,14 @@ class Attempts:
         if held_out_residuals is None:
             held_out_residuals = (
                 predicted_by_others(self.fit_problem, fitted, self.inflation_of(fitted))
-                if self.same
+                if self.nothing_held_out
                 else residuals(self.held_out_problem, fitted.rig)
             )
         held_out_excess = {
             b.name: self.excess(b, self.held_out_problem, held_out_residuals) for b in blocks
         }
         if fitted.events is None and misses_only_held_out(
-            fit_excess, held_out_excess, same=self.same
+            fit_excess, held_out_excess, nothing_held_out=self.nothing_held_out
         ):
             held_out_residuals = predicted_with_doubt(self.held_out_problem, fitted)
             held_out_excess = {

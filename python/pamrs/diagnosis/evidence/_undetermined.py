@@ -64,9 +64,9 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
         if len(candidate.terms) != 1 or chance < settings.in_set:
             continue
-        stated = with_stated_std(problem, group, candidate)
-        inside = may_be_inside(stated, settings.most_tolerances, _DETERMINED_STDS)
-        if inside or _has_undetermined_effect(stated):
+        with_std = with_stated_std(problem, group, candidate)
+        inside = may_be_inside(with_std, settings.most_tolerances, _DETERMINED_STDS)
+        if inside or _has_undetermined_effect(with_std):
             lost = 1.0 if candidate.wrong and to == UNDECIDED else 0.5
             probabilities[candidate.hypothesis] -= lost * chance
             probabilities[to] = probabilities.get(to, 0.0) + lost * chance

@@ -113,19 +113,21 @@ def _at_wall(fit: Fit) -> dict[str, float]:
 def _probabilities_alone(group: BlockGroup) -> dict[Hypothesis, float]:
     """Probabilities of one group alone, with that of `UNDECIDED` divided among other answers."""
     weights = {h: p for h, p in group.probabilities.items() if h != UNDECIDED}
-    unchanged = group.probabilities.get(UNDECIDED, 0.0)
+    undecided = group.probabilities.get(UNDECIDED, 0.0)
     if _leaves_little(group):
-        unchanged += weights.pop(UNLISTED, 0.0)
-    shifted = any(significant(e) for e in group.nominal.values())
-    explained = any(c.wrong and weights.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates)
+        undecided += weights.pop(UNLISTED, 0.0)
+    nominal_misses = any(significant(e) for e in group.nominal.values())
+    has_wrong_value = any(
+        c.wrong and weights.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates
+    )
     quiet = {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
     unlikely = is_unlikely(group.candidates[0].fit)
-    if unlikely and group.mismatch is None and not explained:
+    if unlikely and group.mismatch is None and not has_wrong_value:
         quiet = {PARAMETERS: _STRAINED_PARAMETERS, UNLISTED: _STRAINED_UNLISTED}
-    elif not shifted:
+    elif not nominal_misses:
         quiet |= {NONE: _QUIET_LIKELY, PARAMETERS: _QUIET_OTHER}
     for hypothesis, share in quiet.items():
-        weights[hypothesis] = weights.get(hypothesis, 0.0) + unchanged * share
+        weights[hypothesis] = weights.get(hypothesis, 0.0) + undecided * share
     return {h: p for h, p in weights.items() if p >= _COUNTED or h in WITHOUT_NAME}
 
 

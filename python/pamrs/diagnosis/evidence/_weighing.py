@@ -264,8 +264,8 @@ def _excesses(
 ) -> list[tuple[float, float]]:
     """Excess variance that the baseline and a set leave, on fitted and on held-out recordings."""
 
-    def over(found: dict[str, Excess]) -> float:
-        return sum(max(0.0, found[b.name].ratio - 1.0) for b in suspects)
+    def over(excess_by_block: dict[str, Excess]) -> float:
+        return sum(max(0.0, excess_by_block[b.name].ratio - 1.0) for b in suspects)
 
     return [
         (over(baseline.fit_excess), over(candidate.fit_excess)),

@@ -358,9 +358,11 @@ def _additions(judged: Judged) -> tuple[Term, ...]:
 
 def _models(nominal: Rig, fit_problem: Problem, judged: list[Judged], verdict: str) -> Models:
     """The rig at every stage, from the verdicts of the groups."""
-    refitted = _settled(nominal, fit_problem, judged, [j.group.candidates[0] for j in judged])
-    baseline = _merged(nominal, refitted)
-    starts = _widened(fit_problem, judged, refitted)
+    refitted = _with_common_zeros(
+        nominal, fit_problem, judged, [j.group.candidates[0] for j in judged]
+    )
+    baseline = _merged_rig(nominal, refitted)
+    starts = _with_stated_stds(fit_problem, judged, refitted)
     if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
         final = nominal if verdict == "none" else baseline
         return Models(
@@ -374,13 +376,13 @@ def _models(nominal: Rig, fit_problem: Problem, judged: list[Judged], verdict: s
             verdict,
         )
     wanted = [_model_of(j, start) for j, start in zip(judged, refitted, strict=True)]
-    settled = _settled(nominal, fit_problem, judged, wanted)
-    chosen = _widened(fit_problem, judged, settled)
+    settled = _with_common_zeros(nominal, fit_problem, judged, wanted)
+    chosen = _with_stated_stds(fit_problem, judged, settled)
     judged = [
         replace(j, chosen=c) if j.named or j.wrong else j
         for j, c in zip(judged, chosen, strict=True)
     ]
-    final = _merged(nominal, settled)
+    final = _merged_rig(nominal, settled)
     owners = owners_of_parameters(settled)
     return Models(judged, starts, chosen, owners, nominal, baseline, final, verdict)
 
@@ -432,8 +434,10 @@ def _models_of(
     healthy = {h.rest: p for h, p in probabilities.items() if h in (NONE, PARAMETERS)}
 
     def model(chosen: list[FittedHypothesis]) -> Rig:
-        stated = _widened(problem, judged, chosen)
-        return with_std(_merged(nominal, chosen), nominal, stated, owners_of_parameters(chosen))
+        with_stds = _with_stated_stds(problem, judged, chosen)
+        return with_std(
+            _merged_rig(nominal, chosen), nominal, with_stds, owners_of_parameters(chosen)
+        )
 
     likeliest = max(healthy, key=lambda rest: healthy[rest], default="")
     if sum(healthy.values()) >= least:
@@ -443,7 +447,7 @@ def _models_of(
         wanted = hypothesis.set
         if p < least or hypothesis.rest or not all(t.id in CATALOGUE or t.is_value for t in wanted):
             continue
-        chosen = [_inside(j.group, wanted) for j in judged]
+        chosen = [_within(j.group, wanted) for j in judged]
         if any(c.fit.events is not None for c in chosen):
             continue
         if {term for c in chosen for term in c.terms} == wanted:
@@ -451,7 +455,7 @@ def _models_of(
     return likely
 
 
-def _inside(group: BlockGroup, wanted: frozenset[Term]) -> FittedHypothesis:
+def _within(group: BlockGroup, wanted: frozenset[Term]) -> FittedHypothesis:
     """The most probable hypothesis of a group that names nothing else than what is wanted; the
     baseline where there is none.
     """
@@ -461,7 +465,7 @@ def _inside(group: BlockGroup, wanted: frozenset[Term]) -> FittedHypothesis:
     )
 
 
-def _settled(
+def _with_common_zeros(
     nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[FittedHypothesis]
 ) -> list[FittedHypothesis]:
     """Refit groups with sensors' zeros held that another group determines better and differently.
@@ -509,34 +513,37 @@ def _settled(
     return settled_candidates
 
 
-def _widened(
+def _with_stated_stds(
     problem: Problem, judged: list[Judged], chosen: list[FittedHypothesis]
 ) -> list[FittedHypothesis]:
     """The fits of the groups with the standard deviations that are stated."""
     return [with_stated_std(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
 
 
-def _merged(nominal: Rig, candidates: list[FittedHypothesis]) -> Rig:
+def _merged_rig(nominal: Rig, candidates: list[FittedHypothesis]) -> Rig:
     """One rig from the groups' fits; where two have a value of their own, that of the group that
     knows it best.
     """
     rig = nominal
-    for _, entry in _added(nominal, candidates):
+    for _, entry in _added_effects(nominal, candidates):
         rig = with_entry(rig, entry)
     owners = owners_of_parameters(candidates).items()
     return with_known(rig, {name: candidates[k].fit.values[name] for name, k in owners})
 
 
-def _added(
+def _added_effects(
     nominal: Rig, candidates: list[FittedHypothesis]
 ) -> Iterator[tuple[FittedHypothesis, dict[str, Any]]]:
     """Effects that the fits have and the nominal model has not, each from the fit that knows it
     best.
     """
-    owners, stated = owners_of_effects(candidates), {entry["id"] for entry in nominal.effects}
+    owners, nominal_effects = (
+        owners_of_effects(candidates),
+        {entry["id"] for entry in nominal.effects},
+    )
     for k, candidate in enumerate(candidates):
         for entry in candidate.fit.rig.effects:
-            if entry["id"] not in stated and owners.get(Term.of(entry), k) == k:
+            if entry["id"] not in nominal_effects and owners.get(Term.of(entry), k) == k:
                 yield candidate, entry
 
 
@@ -548,7 +555,7 @@ def with_std(
     """
     spread = {name: candidates[k].fit.std[name] for name, k in owners.items()}
     rig = with_known(rig, {}, {name: s for name, s in spread.items() if math.isfinite(s)})
-    for candidate, entry in _added(nominal, candidates):
+    for candidate, entry in _added_effects(nominal, candidates):
         known = Term.of(entry).own(candidate.fit.std)
         rig = with_entry(rig, entry, {n: s for n, s in known.items() if math.isfinite(s)})
     return rig

@@ -138,11 +138,13 @@ def find_closure(
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
-    chosen = _select(
+    first_choice = _select(
         _StackedFit.of(problem, baseline, baseline, inflation), candidates, columns, {}
     )
     first = (
-        None if chosen is None else _fit_terms(problem, nominal, baseline, inflation, chosen, say)
+        None
+        if first_choice is None
+        else _fit_terms(problem, nominal, baseline, inflation, first_choice, say)
     )
     if first is None:
         return None
@@ -150,11 +152,13 @@ def find_closure(
     candidates, columns, warm = _at_first_fit(
         problem, baseline, first, inflation_left, blocks, closures
     )
-    second = _select(
+    second_choice = _select(
         _StackedFit.of(problem, warm, first, inflation_left), candidates, columns, first.values
     )
     other = (
-        None if second is None else _fit_terms(problem, nominal, warm, inflation_left, second, say)
+        None
+        if second_choice is None
+        else _fit_terms(problem, nominal, warm, inflation_left, second_choice, say)
     )
     return _best_model(
         [baseline, first, *([] if other is None else [other])],
@@ -419,27 +423,27 @@ def _select(
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
     crossed = _LeaveOneOut.of(frame, rows, unit)
-    chosen = _Selection(candidates, target, wide, _LEAST_POWER)
+    selection = _Selection(candidates, target, wide, _LEAST_POWER)
     for k, candidate in enumerate(candidates):
-        if candidate.name in present and usable[k] and chosen.power(k) > _LEAST_POWER:
-            chosen.take(k)
-    order = chosen.order
-    taken, misfit, proof = len(order), chosen.misfit, crossed.left_out(order)
-    samples = frame.independent(chosen.left[: rows.size])
+        if candidate.name in present and usable[k] and selection.power(k) > _LEAST_POWER:
+            selection.take(k)
+    order = selection.order
+    count, misfit, proof = len(order), selection.misfit, crossed.left_out(order)
+    samples = frame.independent(selection.rows_left[: rows.size])
     while len(order) < _MOST_TERMS:
-        telling = chosen.most_telling(usable)
+        telling = selection.most_telling(usable)
         if telling is None:
             break
-        chosen.take(telling)
-        now, proof_now = chosen.misfit, crossed.left_out(order)
-        here = frame.independent(chosen.left[: rows.size])
+        selection.take(telling)
+        now, proof_now = selection.misfit, crossed.left_out(order)
+        here = frame.independent(selection.rows_left[: rows.size])
         gain = here * math.log(misfit / max(now, 1e-300))
         proven = here * math.log(proof / max(proof_now, 1e-300))
-        new = len(order) - taken
+        new = len(order) - count
         price = new * _price(here, len(candidates))
         if proven > 0.0 and (gain > price or (proven > price and gain > new * math.log(here))):
-            taken, misfit, proof, samples = len(order), now, proof_now, here
-    pruned = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
+            count, misfit, proof, samples = len(order), now, proof_now, here
+    pruned = _pruned(target, wide, order[:count], misfit, samples, _price(samples, len(candidates)))
     return _solved(frame, candidates, rows, unit, size, pruned) if pruned else None
 
 
@@ -451,7 +455,7 @@ class _Selection:
     def __init__(
         self, candidates: list[_ShapedTerm], target: Array, wide: Array, least_power: float
     ) -> None:
-        self.left, self._free = target.copy(), wide.copy()
+        self.rows_left, self._free = target.copy(), wide.copy()
         self.order: list[int] = []
         self._candidates, self._least_power = candidates, least_power
         self._shapes: dict[str, float | None] = {}
@@ -459,7 +463,7 @@ class _Selection:
     @property
     def misfit(self) -> float:
         """Sum of squares that is left."""
-        return float(self.left @ self.left)
+        return float(self.rows_left @ self.rows_left)
 
     def power(self, k: int) -> float:
         """Squared length of a term's part that the terms taken before do not explain."""
@@ -472,7 +476,7 @@ class _Selection:
         if candidate.memory:
             self._shapes.setdefault(candidate.memory, candidate.shape)
         direction = self._free[:, k] / max(float(np.linalg.norm(self._free[:, k])), 1e-150)
-        self.left = self.left - direction * float(direction @ self.left)
+        self.rows_left = self.rows_left - direction * float(direction @ self.rows_left)
         self._free = self._free - np.outer(direction, direction @ self._free)
 
     def most_telling(self, usable: Mask) -> int | None:
@@ -488,7 +492,7 @@ class _Selection:
         open_[self.order] = False
         if not open_.any():
             return None
-        explained = (self._free.T @ self.left) ** 2 / np.where(open_, power, 1.0)
+        explained = (self._free.T @ self.rows_left) ** 2 / np.where(open_, power, 1.0)
         return int(np.argmax(np.where(open_, explained, -1.0)))
 
 

@@ -80,7 +80,6 @@ from pamrs.diagnosis.search._sets import (
     combine,
     far_above_noise,
     log_misfit,
-    settles,
     with_freed_values,
 )
 from pamrs.diagnosis.search._wrong_parameters import (
@@ -256,15 +255,15 @@ def _find_hidden_by_values(
     attempts, baseline = refit.attempts, refit.start.fit
     settings = attempts.settings
     if not effects:
-        freed = free_suspects(attempts, baseline, baseline, tell, share=0.0)
-        return {c: price_of_wrong(c, settings) for c in freed}
+        with_freed = free_suspects(attempts, baseline, baseline, tell, share=0.0)
+        return {c: price_of_wrong(c, settings) for c in with_freed}
     state = _screen_mismatch(refit, tell)
     singles = [*_fit_singles(state.search), *_fit_events(state.search, state.per_recording)]
-    present = [c for c in singles if not is_absent(c, settings.most_tolerances)]
-    near = state.search.heaviest_first(present)[: settings.most_polished]
-    ended = [attempts.polish(c) if c in near else c for c in present]
-    return {c: price_of_wrong(c, settings) for c in state.mistaken} | {
-        c: prior_loss(c, state.search.weighing) for c in ended
+    not_absent = [c for c in singles if not is_absent(c, settings.most_tolerances)]
+    near = state.search.heaviest_first(not_absent)[: settings.most_polished]
+    polished = [attempts.polish(c) if c in near else c for c in not_absent]
+    return {c: price_of_wrong(c, settings) for c in state.wrong_values} | {
+        c: prior_loss(c, state.search.weighing) for c in polished
     }
 
 
@@ -393,7 +392,8 @@ def _refit_with_error_sizes(
     size in each block as a share of that.
     """
     blocks, settings = fit_problem.blocks, fit_problem.settings
-    noise_level, same = with_sizes(*error), held_out_problem.recordings is fit_problem.recordings
+    noise_level = with_sizes(*error)
+    nothing_held_out = held_out_problem.recordings is fit_problem.recordings
     baseline, inflation = with_inflation(fit_problem, nominal, white_fit, noise_level)
 
     def excess_by_block(
@@ -410,35 +410,42 @@ def _refit_with_error_sizes(
     )
     held_out_residuals = (
         predicted_by_others(fit_problem, baseline, inflation)
-        if same
+        if nothing_held_out
         else residuals(held_out_problem, baseline.rig)
     )
     held_out_excess = excess_by_block(held_out_problem, held_out_residuals)
     # what parameters could not be told from the fitted recordings shows in the others alone, and is
     # no mismatch
 
-    def held_out_alone(excesses: dict[str, Excess]) -> list[Block]:
+    def shown_by_held_out(excesses: dict[str, Excess]) -> list[Block]:
         return [
             b
             for b in blocks
             if significant(excesses[b.name], _HELD_OUT_RATIO)
             and fit_excess[b.name].ratio > _FITTED_HINT
-            and not same
+            and not nothing_held_out
         ]
 
-    apart = held_out_alone(held_out_excess)
-    if misses_only_held_out(fit_excess, held_out_excess, same=same):
+    held_out_alone = shown_by_held_out(held_out_excess)
+    if misses_only_held_out(fit_excess, held_out_excess, nothing_held_out=nothing_held_out):
         held_out_residuals = predicted_with_doubt(held_out_problem, baseline)
         held_out_excess = excess_by_block(held_out_problem, held_out_residuals)
-    apart_with_doubt = held_out_alone(held_out_excess)
-    suspects = [b for b in blocks if significant(fit_excess[b.name]) or b in apart_with_doubt]
+    alone_with_doubt = shown_by_held_out(held_out_excess)
+    suspects = [b for b in blocks if significant(fit_excess[b.name]) or b in alone_with_doubt]
     attempts = Attempts(
         fit_problem, held_out_problem, nominal, noise_level, held_out_excess, suspects
     )
     likelihood = attempts.likelihood_of(baseline.residuals, held_out_residuals)
     start = FittedHypothesis((), baseline, held_out_excess, fit_excess, 0.0, likelihood=likelihood)
     return _Refit(
-        attempts, white_fit, inflation, nominal_excess, start, apart, nominal_residuals, error
+        attempts,
+        white_fit,
+        inflation,
+        nominal_excess,
+        start,
+        held_out_alone,
+        nominal_residuals,
+        error,
     )
 
 
@@ -460,16 +467,18 @@ def _healthy_group(refit: _Refit, common: FittedHypothesis) -> BlockGroup:
     """Group whose baseline, fitted to all recordings, leaves only noise in them."""
     attempts = refit.attempts
     # what the nominal model leaves in the held-out ones is what the parameters are moved for
-    quiet = residuals(attempts.held_out_problem, attempts.nominal)
-    ever = {
+    nominal_residuals = residuals(attempts.held_out_problem, attempts.nominal)
+    largest_excess = {
         b.name: max(
             refit.nominal_excess[b.name],
-            attempts.excess(b, attempts.held_out_problem, quiet),
+            attempts.excess(b, attempts.held_out_problem, nominal_residuals),
             key=lambda e: e.ratio,
         )
         for b in attempts.fit_problem.blocks
     }
-    return replace(refit.group([common], {UNDECIDED: 1.0}, None), nominal=ever, suspects=[])
+    return replace(
+        refit.group([common], {UNDECIDED: 1.0}, None), nominal=largest_excess, suspects=[]
+    )
 
 
 def _acting_effects(attempts: Attempts) -> list[Term]:
@@ -505,7 +514,7 @@ def _refit_with_smaller_curve_error(refit: _Refit, tell: Say) -> _Refit | None:
     baseline = state.search.start.fit
     short_fits = two_at_a_time(lambda start: least.attempts.fit_shortly([start], baseline), starts)
     events = _fit_events(state.search, [*state.per_recording, *state.transient])
-    singles = [*(c for c in short_fits if c is not None), *events, *state.mistaken]
+    singles = [*(c for c in short_fits if c is not None), *events, *state.wrong_values]
     return refit.with_smaller_error([refit.start, *singles])
 
 
@@ -519,7 +528,7 @@ class _SearchState:
         Screen and weights.
     mismatch : Block
         The block that keeps most.
-    mistaken : list of FittedHypothesis
+    wrong_values : list of FittedHypothesis
         Values that may be wrong.
     per_recording, transient : list of Term
         Effects with sizes, and with times, of their own in each recording.
@@ -527,7 +536,7 @@ class _SearchState:
 
     search: Search
     mismatch: Block
-    mistaken: list[FittedHypothesis]
+    wrong_values: list[FittedHypothesis]
     per_recording: list[Term]
     transient: list[Term]
 
@@ -535,7 +544,9 @@ class _SearchState:
 def _fit_hypotheses(refit: _Refit, tell: Say) -> Mismatch:
     """Mismatch with every hypothesis that was tried for it, at one size of the curve error."""
     state = _screen_mismatch(refit, tell)
-    candidates = _fit_candidates(state.search, state.mistaken, state.per_recording, state.transient)
+    candidates = _fit_candidates(
+        state.search, state.wrong_values, state.per_recording, state.transient
+    )
     candidates, weighed = _weigh_to_the_end(state.search, candidates)
     return Mismatch(refit, state.mismatch, state.search, candidates, weighed)
 
@@ -559,7 +570,7 @@ def _screen_mismatch(refit: _Refit, tell: Say) -> _SearchState:
     ]
     persistent = [e for e in acting if e.info.lasting]
     part = attempts.fit_problem.losses.part
-    mistaken = part(
+    wrong_values = part(
         "the search for wrong values",
         lambda: free_suspects(attempts, start.fit, refit.white_fit, tell),
         [],
@@ -577,13 +588,16 @@ def _screen_mismatch(refit: _Refit, tell: Say) -> _SearchState:
     )
     weighing = Weighing(
         probability_cap(
-            attempts.fit_problem, mismatch, now[mismatch.name].rms, alone=attempts.same and sealed
+            attempts.fit_problem,
+            mismatch,
+            now[mismatch.name].rms,
+            alone=attempts.nothing_held_out and sealed,
         ),
         max(p.n * p.dt for p in attempts.fit_problem.recordings),
         attempts.settings,
     )
     search = Search(attempts, screened, start, weighing, tell)
-    return _SearchState(search, mismatch, mistaken, per_recording, transient)
+    return _SearchState(search, mismatch, wrong_values, per_recording, transient)
 
 
 @dataclass(frozen=True, eq=False)
@@ -758,7 +772,7 @@ def _best_of_each(candidates: list[FittedHypothesis]) -> list[FittedHypothesis]:
 
 def _fit_candidates(
     search: Search,
-    mistaken: list[FittedHypothesis],
+    wrong_values: list[FittedHypothesis],
     per_recording: list[Term],
     transient: list[Term],
 ) -> list[FittedHypothesis]:
@@ -772,23 +786,24 @@ def _fit_candidates(
     what = "the effects that are the same data as others"
     singles = part(what, lambda: _add_same_data(search, singles), singles)
     singles += _fit_events(search, per_recording)
-    if transient and not any(cannot_gain(c, attempts) for c in (*singles, *mistaken)):
+    if transient and not any(cannot_gain(c, attempts) for c in (*singles, *wrong_values)):
         search.tell(
             f"looking for what happens at times of its own ({', '.join(map(str, transient))})"
         )
         singles += _fit_events(search, transient)
         singles = _best_of_each(singles)
-    if any(settles(c, attempts, start) for c in (*singles, *mistaken)):
+    # what leaves only noise calls for no pair
+    if any(explains(c, start, attempts.compared) for c in (*singles, *wrong_values)):
         lasting = sorted((c for c in singles if c.fit.events is None), key=log_misfit)
 
         def more() -> list[FittedHypothesis]:
             near = _nearly_as_heavy(lasting, alone)
             return [s for c in near for s in with_freed_values(search, c)]
     else:
-        more = partial(combine, search, singles, mistaken, transient)
+        more = partial(combine, search, singles, wrong_values, transient)
     sets = part("the search for sets of names", more, [])
     considered = part("what was asked for", lambda: fit_considered(search), [])
-    return [start, *_best_of_each([*singles, *sets, *mistaken, *considered])]
+    return [start, *_best_of_each([*singles, *sets, *wrong_values, *considered])]
 
 
 def _fit_events(search: Search, effects: list[Term]) -> list[FittedHypothesis]:
@@ -849,7 +864,7 @@ def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGro
         )
         return group
     group = replace(group, sought=True)
-    closed = find_closure(
+    closure = find_closure(
         attempts.fit_problem,
         attempts.nominal,
         start.fit,
@@ -858,10 +873,10 @@ def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGro
         say,
         attempts.noise_level,
     )
-    if closed is None:
+    if closure is None:
         return group
     try:
-        assessed = attempts.assess(closed.effects, closed)
+        assessed = attempts.assess(closure.effects, closure)
     except SimulationError:
         return group
     # what does not carry over to recordings that were held out is no form of anything

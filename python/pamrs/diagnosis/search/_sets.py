@@ -16,7 +16,6 @@ from pamrs.diagnosis.evidence import (
     Attempts,
     FittedHypothesis,
     Weighing,
-    explains,
     log_weight,
     possible_gain,
     share_left,
@@ -108,7 +107,7 @@ class Search:
 def combine(
     search: Search,
     singles: list[FittedHypothesis],
-    mistaken: list[FittedHypothesis],
+    wrong_values: list[FittedHypothesis],
     transient: list[Term],
 ) -> list[FittedHypothesis]:
     """Sets of two hypotheses and more, where no single one settles the mismatch.
@@ -121,7 +120,7 @@ def combine(
     ----------
     search : Search
         What they are found with.
-    singles, mistaken : list of FittedHypothesis
+    singles, wrong_values : list of FittedHypothesis
         Single effects and values that are wrong, fitted by themselves.
     transient : list of Term
         Effects that happen at times of their own.
@@ -130,15 +129,15 @@ def combine(
     -------
     list of FittedHypothesis
     """
-    roots = search.heaviest_first(c for c in (*singles, *mistaken) if c.fit.events is None)
+    roots = search.heaviest_first(c for c in (*singles, *wrong_values) if c.fit.events is None)
     growing = _Growing(search, roots)
     sets = [s for root in roots[:MOST_PAIRED] for s in growing.widen(root)]
-    happening = []
+    with_events = []
     for effect, beside in _event_partners(search, singles, transient):
         search.tell(f"looking for {effect} with {beside.effects[0]}")
         fitted = search.attempts.fit_events(effect, beside)
-        happening += [] if fitted is None else [fitted]
-    return [*sets, *happening, *growing.grow(sets)]
+        with_events += [] if fitted is None else [fitted]
+    return [*sets, *with_events, *growing.grow(sets)]
 
 
 def with_freed_values(search: Search, single: FittedHypothesis) -> list[FittedHypothesis]:
@@ -186,15 +185,15 @@ class _Growing:
         What they are found with.
     roots : list of FittedHypothesis
         Single effects and values that are wrong, fitted by themselves, those that weigh most first.
-    done : set of Hypothesis
-        Those that were fitted.
+    tried_sets : set of Hypothesis
+        Sets that were fitted.
     likely : list of _Partner
         What leaves least beside the single hypothesis that weighs most, which the others get too.
     """
 
     search: Search
     roots: list[FittedHypothesis]
-    done: set[Hypothesis] = field(default_factory=set)
+    tried_sets: set[Hypothesis] = field(default_factory=set)
     likely: list[_Partner] = field(default_factory=list)
 
     @property
@@ -250,7 +249,7 @@ class _Growing:
         partners = []
         for partner in self._partners(base, starts):
             if not self._was_tried(base, partner.terms):
-                self.done.add(Hypothesis((*base.terms, *partner.terms)))
+                self.tried_sets.add(Hypothesis((*base.terms, *partner.terms)))
                 self.search.tell(f"trying {Hypothesis((*base.terms, *partner.terms))}")
                 partners.append(partner)
 
@@ -263,7 +262,7 @@ class _Growing:
 
     def _was_tried(self, base: FittedHypothesis, terms: tuple[Term, ...]) -> bool:
         """True where a set was fitted with some further terms."""
-        return Hypothesis((*base.terms, *terms)) in self.done
+        return Hypothesis((*base.terms, *terms)) in self.tried_sets
 
     def _partners(self, base: FittedHypothesis, starts: list[Start]) -> Iterator[_Partner]:
         """Partners of a set: effects whose signature is in what it leaves, terms that explain much
@@ -379,7 +378,7 @@ def _one_place_each(terms: list[Term]) -> list[Term]:
 
 
 def _event_partners(
-    search: Search, singles: list[FittedHypothesis], happening: list[Term]
+    search: Search, singles: list[FittedHypothesis], transient: list[Term]
 ) -> list[tuple[Term, FittedHypothesis]]:
     """Effects with times of their own, each with a persistent one that may have acted as well.
 
@@ -390,7 +389,7 @@ def _event_partners(
     steady = [c for c in singles if c.fit.events is None]
     best = max(steady, key=search.weight, default=start)
     leaves_some = _TRANSIENT_BESIDE < search.share_left(best) < _MUCH_LEFT
-    pairs = [(e, best) for e in happening] if leaves_some else []
+    pairs = [(e, best) for e in transient] if leaves_some else []
     mismatch = float(screened.tangent.rows @ screened.tangent.rows)
     for single in singles:
         if single.fit.events is None or search.share_left(single) > _MUCH_LEFT:
@@ -534,11 +533,6 @@ def far_above_noise(attempts: Attempts, candidate: FittedHypothesis) -> bool:
         for b in attempts.suspects
         for excess_by_block in (fit_excess, candidate.held_out_excess)
     )
-
-
-def settles(candidate: FittedHypothesis, attempts: Attempts, start: FittedHypothesis) -> bool:
-    """True where a hypothesis leaves only noise, so that no pair is called for."""
-    return explains(candidate, start, attempts.compared)
 
 
 def cannot_gain(candidate: FittedHypothesis, attempts: Attempts) -> bool:

@@ -146,8 +146,8 @@ def free_suspects(
     walls = attempts.settings.most_tolerances
     suspects = [
         names
-        for freed in (baseline, first)
-        for names in suspected_values(freed, attempts.fit_problem.blocks)
+        for fitted in (baseline, first)
+        for names in suspected_values(fitted, attempts.fit_problem.blocks)
     ]
     gains = _worth_a_fit(attempts, baseline, list(dict.fromkeys(suspects)), attempts.no_inflation)
     # the linear model says little of what is far away: each parameter is fitted, whatever its
@@ -156,12 +156,12 @@ def free_suspects(
     pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][
         :_MOST_PAIRS
     ]
-    freed = []
+    candidates = []
     sets = [names for names in gains if len(names) == 1 or names in pairs]
     for names, candidate in _fit_freed(attempts, sets, baseline, say, share).items():
         if candidate is not None and candidate.is_wrong(walls):
-            freed.append(replace(candidate, gain=gains[names]))
-    return freed
+            candidates.append(replace(candidate, gain=gains[names]))
+    return candidates
 
 
 def far_parameters(attempts: Attempts, fitted: Fit) -> list[str]:
@@ -293,22 +293,22 @@ def price_of_wrong(candidate: FittedHypothesis, settings: DiagnosisSettings) -> 
     return settings.file_log_odds * len(candidate.wrong) + beyond
 
 
-def weigh_only_noise(quiet: BlockGroup, prices: Mapping[FittedHypothesis, float]) -> BlockGroup:
+def weigh_only_noise(group: BlockGroup, prices: Mapping[FittedHypothesis, float]) -> BlockGroup:
     """A group whose baseline leaves only noise, with further hypotheses and the logarithm of what
     each costs; those that leave more than noise, or predict worse, are left out.
     """
-    start = quiet.candidates[0]
+    start = group.candidates[0]
     scores = {
         c: _plausibility(c) - _plausibility(start) - price
         for c, price in prices.items()
         if not any(significant(e) for e in c.fit_excess.values()) and _carries_over(c, start)
     }
-    top, undecided = max(0.0, *scores.values(), 0.0), quiet.probabilities[UNDECIDED]
+    top, undecided = max(0.0, *scores.values(), 0.0), group.probabilities[UNDECIDED]
     weights = {c.hypothesis: undecided * math.exp(score - top) for c, score in scores.items()}
-    before = {h: p * math.exp(-top) for h, p in quiet.probabilities.items()}
+    before = {h: p * math.exp(-top) for h, p in group.probabilities.items()}
     total = sum(weights.values()) + sum(before.values())
     probabilities = {h: w / total for h, w in (before | weights).items()}
-    return replace(quiet, candidates=[*quiet.candidates, *scores], probabilities=probabilities)
+    return replace(group, candidates=[*group.candidates, *scores], probabilities=probabilities)
 
 
 def _plausibility(candidate: FittedHypothesis) -> float:
