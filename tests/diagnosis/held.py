@@ -9,8 +9,8 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts
 from pamrs.diagnosis.noise import noise_levels
+from pamrs.diagnosis.search import Attempts
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.diagnosis.asked import problem_of

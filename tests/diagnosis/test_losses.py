@@ -11,11 +11,10 @@ import pytest
 import pamrs
 from pamrs._arrays import solve_normal
 from pamrs._losses import STRICT, Losses
-from pamrs.diagnosis.evidence import _candidates
 from pamrs.diagnosis.explain import _assemble
 from pamrs.diagnosis.model import _conclude
 from pamrs.diagnosis.next_experiment import _choice
-from pamrs.diagnosis.search import _hypotheses
+from pamrs.diagnosis.search import _attempts, _hypotheses
 from pamrs.effects import Term
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
@@ -57,14 +56,14 @@ def told(found: pamrs.Diagnosis) -> list[str]:
 
 @pytest.mark.usefixtures("lenient")
 def test_a_hypothesis_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = _candidates.fit
+    right = _attempts.fit
 
     def fit(problem: Any, nominal: Any, effects: Any, *rest: Any, **options: Any) -> Any:
         return (broken if Term("heat_transfer") in effects else right)(
             problem, nominal, effects, *rest, **options
         )
 
-    monkeypatch.setattr(_candidates, "fit", fit)
+    monkeypatch.setattr(_attempts, "fit", fit)
     found = pamrs.diagnose(leaking())
     assert found.effects[0].id == "leak_muscle"
     assert found.warnings[0] == told(found)[0]

@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from pamrs.diagnosis.evidence import no_inflation
 from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.noise import no_inflation
 from pamrs.diagnosis.prepare import Unjudged
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import refitted

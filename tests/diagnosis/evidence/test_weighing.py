@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, possible_gain, weigh
+from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, possible_gain, weigh
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.evidence._verdicts import _with_capped_names
 from pamrs.diagnosis.evidence._weighing import loss_by_values
@@ -19,7 +19,7 @@ from pamrs.diagnosis.fit import Events, Fit, Problem, Start, fits
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.diagnosis.screen import Score
-from pamrs.diagnosis.search import _hypotheses
+from pamrs.diagnosis.search import Attempts, _hypotheses
 from pamrs.effects import EFFECTS, NONE, UNLISTED, Hypothesis, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
@@ -54,7 +54,7 @@ def hypothesis(
     alike = correlation + (1.0 - correlation) * np.eye(len(spreads))
     fitted = {
         "std": std,
-        "covariance": np.held_out_problem(spreads, spreads) * alike,
+        "covariance": np.outer(spreads, spreads) * alike,
         "events": events,
     }
     kept = {"arm": Excess(1.0 + left * (BEFORE - 1.0), 0.0, 0.5, 1.0, 1.0, 1.2, 0.05)}
@@ -280,7 +280,7 @@ def test_inside_the_error_of_the_model_effects_get_a_few_steps(
     shortly = SimpleNamespace(fit_shortly=lambda starts, _: starts[0].effect.id)
     refit = SimpleNamespace(
         error=({}, {"arm": 1.0}),
-        error_is_given=False,
+        attempts=SimpleNamespace(nominal=RIG, settings=SETTINGS),
         start="start",
         with_error_sizes=lambda sizes: SimpleNamespace(attempts=shortly),
         with_smaller_error=lambda candidates: candidates,

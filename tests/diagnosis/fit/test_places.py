@@ -14,11 +14,12 @@ import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, weigh
+from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, weigh
 from pamrs.diagnosis.fit import Problem, acts_in, places_of, residuals, starts_of
 from pamrs.diagnosis.next_experiment import measurable
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.search import Attempts
 from pamrs.effects import CATALOGUE, Term, find_parameter
 from pamrs.findings import BlockVerdict, Part
 from pamrs.recordings import Recording

@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pamrs
-from pamrs.diagnosis.evidence import inflation_of
 from pamrs.diagnosis.fit import Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.fit._fitting import Scaling
 from pamrs.diagnosis.fit._known_parameters import (
@@ -22,7 +21,7 @@ from pamrs.diagnosis.fit._known_parameters import (
     moved_slope,
     moved_value,
 )
-from pamrs.diagnosis.noise import noise_levels
+from pamrs.diagnosis.noise import inflation_of, noise_levels
 from pamrs.diagnosis.prepare import Prepared, predicted, residual, with_unjudged_starts
 from pamrs.rig import Parameter
 from pamrs.simulation import core_rig

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 import pamrs
 from pamrs.diagnosis import _problems
-from pamrs.diagnosis.evidence import inflation_of, no_inflation
 from pamrs.diagnosis.fit import Fit, Problem, residuals
+from pamrs.diagnosis.noise import inflation_of, no_inflation
 from pamrs.diagnosis.ready import readied
 from pamrs.diagnosis.search import refitted, with_inflation
 from pamrs.recordings import Recording

@@ -8,17 +8,11 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import (
-    Attempts,
-    BlockGroup,
-    FittedHypothesis,
-    Weighing,
-    judge,
-    weigh,
-)
+from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, Weighing, judge, weigh
 from pamrs.diagnosis.fit import Fit, Problem
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._hypotheses import _split_by_names
 from pamrs.effects import UNLISTED, Hypothesis
 from pamrs.findings import case_verdict

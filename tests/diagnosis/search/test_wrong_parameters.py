@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts, FittedHypothesis
+from pamrs.diagnosis.evidence import FittedHypothesis
 from pamrs.diagnosis.fit import Problem, fit
 from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
 from pamrs.diagnosis.search import suspected_values
+from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, _needless
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig

@@ -101,12 +101,8 @@ class Judged:
         return min(1.0, sum(p for h, p in self.probabilities.items() if term in h.terms))
 
 
-def parameters_at_wall(group: BlockGroup) -> dict[str, float]:
-    """Parameters that the refit without effects moved to their wall, and how far [tolerances]."""
-    return _at_wall(group.candidates[0].fit)
-
-
-def _at_wall(fit: Fit) -> dict[str, float]:
+def parameters_at_wall(fit: Fit) -> dict[str, float]:
+    """Parameters that a fit moved to their wall, and how far [tolerances]."""
     return {name: far for name, far in fit.moved.items() if abs(far) >= WALL_TOLERANCES}
 
 
@@ -142,7 +138,7 @@ def is_unlikely(fit: Fit) -> bool:
     """True where a value is at its wall, or values inside their tolerances and starts of gases lie
     further from what is known of them, together, than one in a hundred draws of them.
     """
-    if _at_wall(fit):
+    if parameters_at_wall(fit):
         return True
     moved = sum(abs(far) > 0.0 for far in fit.held_by_prior.values())
     starts = sum(residual.strain > 0.0 for residual in fit.residuals.values())

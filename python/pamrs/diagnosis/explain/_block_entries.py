@@ -82,7 +82,7 @@ def _located(judged: Judged) -> str | None:
     group = judged.group
     if group.mismatch is not None:
         return group.mismatch.name
-    moved = parameters_at_wall(group)
+    moved = parameters_at_wall(group.candidates[0].fit)
     worst = judged.wrong or tuple(sorted(moved, key=lambda name: -abs(moved[name])))
     told = [b.name for b in group.blocks if worst and depends(b, worst[0])]
     named = [b.name for b in group.blocks if any(concerns(term, b) for term in judged.named)]

@@ -140,7 +140,8 @@ def warnings(
     out = []
     groups = [j.group for j in judged]
     mistaken = any(j.wrong for j in judged)
-    symptoms = {n: v for j in judged if not j.wrong for n, v in parameters_at_wall(j.group).items()}
+    starts = [j.group.candidates[0] for j in judged if not j.wrong]
+    symptoms = {n: v for start in starts for n, v in parameters_at_wall(start.fit).items()}
     for recording in case.recordings:
         for channel, values in recording.channels.items():
             if (

@@ -20,12 +20,9 @@ from pamrs.diagnosis.evidence import (
     case_ambiguity,
     case_probabilities,
     drop_undetermined,
-    inflation_of,
     is_outside,
     judge,
-    parts_of,
     put_aside,
-    start_of,
     with_stated_std,
 )
 from pamrs.diagnosis.fit import (
@@ -45,8 +42,9 @@ from pamrs.diagnosis.fit import (
 )
 from pamrs.diagnosis.model._budget import budget, owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.model._free_run import KnownValues, free_run
-from pamrs.diagnosis.noise import NoiseLevel
+from pamrs.diagnosis.noise import NoiseLevel, inflation_of
 from pamrs.diagnosis.prepare import Block, Residual
+from pamrs.diagnosis.search import parts_of, start_of
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, NONE, PARAMETERS, UNDECIDED, UNLISTED, Hypothesis, Term
 from pamrs.errors import SimulationError
@@ -227,13 +225,11 @@ def conclude(
 
 def _own_errors(problem: Problem, noise_level: dict[Key, NoiseLevel]) -> dict[str, float]:
     """Standard deviation of each channel by the error that is taken for the model's own [SI]."""
-    sizes = {}
-    for block in problem.blocks:
-        levels = [noise_level[block.name, p.recording.name] for p in problem.recordings]
-        sizes[block.channel] = math.sqrt(
-            sum(level.error_variance for level in levels) / len(levels)
-        )
-    return sizes
+    names = [p.recording.name for p in problem.recordings]
+    return {
+        b.channel: math.sqrt(sum(noise_level[b.name, n].error_variance for n in names) / len(names))
+        for b in problem.blocks
+    }
 
 
 def _sound_models(
@@ -567,21 +563,16 @@ def _table(
     """Error of every channel at every stage."""
     out = {}
     for block in problem.blocks:
-        errors = {}
-        noise, weights = [], []
-        for prepared in problem.recordings:
-            noise.append(noise_level[block.name, prepared.recording.name].sample ** 2)
-            weights.append(
-                max(1, int(by_stage["refit"][block.name, prepared.recording.name].rows.sum()))
-            )
-        level = math.sqrt(float(np.average(noise, weights=weights)))
+        keys = [(block.name, p.recording.name) for p in problem.recordings]
+        weights = [max(1, int(by_stage["refit"][key].rows.sum())) for key in keys]
+        squares = [[noise_level[key].sample ** 2 for key in keys]]
         for stage in ("before", "refit", "after"):
-            squares = []
-            for prepared in problem.recordings:
-                r = by_stage[stage][block.name, prepared.recording.name]
-                squares.append(float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0)
-            errors[stage] = math.sqrt(float(np.average(squares, weights=weights)))
-        out[block.channel] = ChannelError(level, errors["before"], errors["refit"], errors["after"])
+            left = [by_stage[stage][key] for key in keys]
+            squares.append(
+                [float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0 for r in left]
+            )
+        errors = [math.sqrt(float(np.average(one, weights=weights))) for one in squares]
+        out[block.channel] = ChannelError(*errors)
     return out
 
 

@@ -2,7 +2,7 @@
 
 Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `means_in_noises`,
 `curve_errors_of`, `whitening`, `error_sizes`, `with_sizes`, `correlation_time`, `usual_inflation`,
-`inflation_apart`.
+`inflation_apart`, `inflation_of`, `no_inflation`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from pamrs.diagnosis.noise._levels import (
     bins_of,
     error_sizes,
     excess,
+    inflation_of,
     means_in_noises,
+    no_inflation,
     noise_levels,
     with_sizes,
 )
@@ -32,12 +34,14 @@ __all__ = [
     "Excess",
     "NoiseLevel",
     "inflation_apart",
+    "inflation_of",
     "bins_of",
     "correlation_time",
     "error_sizes",
     "excess",
     "usual_inflation",
     "means_in_noises",
+    "no_inflation",
     "curve_errors_of",
     "noise_levels",
     "whitening",

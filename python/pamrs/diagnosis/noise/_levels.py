@@ -1,10 +1,10 @@
-"""Noise levels, excess of residuals over them, and statistics of autocorrelated residuals."""
+"""Noise levels, excess of residuals over them, and the inflation of fits by both."""
 
 from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from zlib import crc32
 
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
 from pamrs import _core
-from pamrs.diagnosis.fit import FIT_BIN_TIME, PIECE_TIME, Key, Problem, bin_width
-from pamrs.diagnosis.noise._autocorrelation import inflated
+from pamrs.diagnosis.fit import FIT_BIN_TIME, PIECE_TIME, Fit, Inflation, Key, Problem, bin_width
+from pamrs.diagnosis.noise._autocorrelation import inflated, inflation_apart, usual_inflation
 from pamrs.diagnosis.noise._discrepancy import CurveErrors, curves, operating_ranges, whitening
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual, smoothed
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -485,4 +485,35 @@ def _pooled(
         margin * math.exp(beyond),
         scatter,
         tuple(pieces),
+    )
+
+
+def no_inflation(blocks: Iterable[Block]) -> dict[str, float]:
+    """Inflation of blocks whose residual is white noise: 1 for each."""
+    return dict.fromkeys((b.name for b in blocks), 1.0)
+
+
+def inflation_of(problem: Problem, fitted: Fit, noise_level: Mapping[Key, NoiseLevel]) -> Inflation:
+    """Inflation by the autocorrelation that a fit leaves in each block, at the least that of the
+    noise: parameters that follow the noise of a drive leave too little of it. A recording that is
+    missed by far more than most has one of its own, so that it takes no weight from the others.
+    """
+
+    def noise_of(block: Block) -> float:
+        keys = [(block.name, p.recording.name) for p in problem.recordings]
+        levels = [noise_level[key].inflation for key in keys if key in noise_level]
+        return float(np.mean(levels)) if levels else 1.0
+
+    recordings_and_residuals = problem.recordings, fitted.residuals, FIT_BIN_TIME
+    usual = {
+        b.name: max(noise_of(b), usual_inflation(b, *recordings_and_residuals))
+        for b in problem.blocks
+    }
+    return Inflation(
+        usual,
+        {
+            key: of_recording
+            for b in problem.blocks
+            for key, of_recording in inflation_apart(b, *recordings_and_residuals).items()
+        },
     )

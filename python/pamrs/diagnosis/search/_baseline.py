@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pamrs.diagnosis.evidence import WALL_TOLERANCES, inflation_of
+from pamrs.diagnosis.evidence import WALL_TOLERANCES
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
@@ -23,7 +23,7 @@ from pamrs.diagnosis.fit import (
     residuals,
     stacked,
 )
-from pamrs.diagnosis.noise import CORRELATED_VARIANCE, NoiseLevel
+from pamrs.diagnosis.noise import CORRELATED_VARIANCE, NoiseLevel, inflation_of
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -79,8 +79,6 @@ def _sample_noise_levels(residual: Residual) -> float:
 
 def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: Fit | None) -> Fit:
     """Baseline parameters alone, fitted to the end."""
-    settings = problem.settings
-    evaluations = settings.baseline_evaluations
     return fit(
         problem,
         nominal,
@@ -88,7 +86,7 @@ def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: 
         {},
         inflation,
         warm=warm,
-        evaluations=evaluations,
+        evaluations=problem.settings.baseline_evaluations,
         share=FINAL_STEP_SHARE,
     )
 

@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._arrays import Array, Mask
-from pamrs.diagnosis.evidence import inflation_of
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, residuals, stacked, with_priors
-from pamrs.diagnosis.noise import NoiseLevel, correlation_time
+from pamrs.diagnosis.noise import NoiseLevel, correlation_time, inflation_of
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import (
     CLOSURE_OF,
@@ -179,11 +178,6 @@ def _closures(blocks: Sequence[Block]) -> dict[str, str]:
     return {name: closure for name, closure in closures.items() if closure is not None}
 
 
-def _shapes(closure: str) -> dict[str, tuple[float, ...]]:
-    """Values of each memory shape of a closure that are tried."""
-    return {p.name: p.starts for p in EFFECTS[closure].parameters if p.neutral is None}
-
-
 def _columns(
     problem: Problem,
     base: Fit,
@@ -215,7 +209,10 @@ def _at_zero(
     """Every term at every shape of its memory, and what each does to the stacked residuals per unit
     of its coefficient (n, m).
     """
-    shapes_tried = {closure: _shapes(closure) for closure in closures.values()}
+    shapes_tried = {
+        closure: {p.name: p.starts for p in EFFECTS[closure].parameters if p.neutral is None}
+        for closure in closures.values()
+    }
     rounds = max(len(values) for shapes in shapes_tried.values() for values in shapes.values())
     candidates: list[_ShapedTerm] = []
     columns = []

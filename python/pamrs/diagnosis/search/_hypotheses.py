@@ -16,7 +16,6 @@ from pamrs._progress import Line
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     SHARED_ODDS,
-    Attempts,
     BlockGroup,
     FittedHypothesis,
     Weighing,
@@ -25,13 +24,15 @@ from pamrs.diagnosis.evidence import (
     is_absent,
     is_unlikely,
     misses_only_held_out,
-    no_inflation,
+    possible_gain,
+    price_of_wrong,
     prior_loss,
     probability_cap,
     same_recordings,
     share_left,
     significant,
     weigh,
+    weigh_only_noise,
 )
 from pamrs.diagnosis.fit import (
     Fit,
@@ -42,6 +43,7 @@ from pamrs.diagnosis.fit import (
     concerns,
     fits,
     form_in,
+    predicted_by_others,
     predicted_with_doubt,
     residuals,
     same_data_in,
@@ -55,18 +57,13 @@ from pamrs.diagnosis.noise import (
     curve_errors_of,
     error_sizes,
     excess,
+    no_inflation,
     noise_levels,
     with_sizes,
 )
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.diagnosis.screen import (
-    Score,
-    Screen,
-    best_of_each_kind,
-    by_effect,
-    predicted_by_others,
-    screen,
-)
+from pamrs.diagnosis.screen import Score, Screen, best_of_each_kind, by_effect, screen
+from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._baseline import refitted, thorough, with_inflation
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._considered import fit_considered
@@ -76,17 +73,12 @@ from pamrs.diagnosis.search._sets import (
     MOST_STARTS,
     NEAR_PLACE,
     Search,
-    cannot_gain,
     combine,
     far_above_noise,
     log_misfit,
     with_freed_values,
 )
-from pamrs.diagnosis.search._wrong_parameters import (
-    free_suspects,
-    price_of_wrong,
-    weigh_only_noise,
-)
+from pamrs.diagnosis.search._wrong_parameters import free_suspects
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
     CATALOGUE,
@@ -301,11 +293,6 @@ class _Refit:
     nominal_residuals: dict[Key, Residual]
     error: tuple[dict[Key, NoiseLevel], dict[str, float]]
 
-    @property
-    def error_is_given(self) -> bool:
-        """True where the size of the curve error is stated: by the rig file, or as none."""
-        return _error_is_given(self.attempts.nominal, self.attempts.settings)
-
     def with_smaller_error(self, candidates: list[FittedHypothesis]) -> _Refit | None:
         """Refit with the smaller curve error that the likeliest hypothesis leaves, or None."""
         attempts, (usual, sizes) = self.attempts, self.error
@@ -497,7 +484,8 @@ def _refit_with_smaller_curve_error(refit: _Refit, tell: Say) -> _Refit | None:
     one and none; else None.
     """
     sizes = refit.error[1]
-    if refit.error_is_given or max(sizes.values()) <= LEAST_SIZE:
+    given = _error_is_given(refit.attempts.nominal, refit.attempts.settings)
+    if given or max(sizes.values()) <= LEAST_SIZE:
         return None
     least = refit.with_error_sizes(dict.fromkeys(sizes, LEAST_SIZE))
     if least is None:
@@ -786,7 +774,11 @@ def _fit_candidates(
     what = "the effects that are the same data as others"
     singles = part(what, lambda: _add_same_data(search, singles), singles)
     singles += _fit_events(search, per_recording)
-    if transient and not any(cannot_gain(c, attempts) for c in (*singles, *wrong_values)):
+    # of a further effect of one parameter, which has to pay for itself
+    least = attempts.settings.further_price + attempts.settings.parameter_price
+    if transient and not any(
+        possible_gain(c, attempts.compared) < least for c in (*singles, *wrong_values)
+    ):
         search.tell(
             f"looking for what happens at times of its own ({', '.join(map(str, transient))})"
         )
@@ -985,7 +977,6 @@ def _fit_all_recordings(attempts: Attempts, start: FittedHypothesis) -> FittedHy
 def _fit_singles(search: Search) -> list[FittedHypothesis]:
     """The effects that the screen finds worth it, fitted; the most telling first."""
     attempts, screened, baseline = search.attempts, search.screened, search.start.fit
-    settings = attempts.settings
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
@@ -1000,7 +991,7 @@ def _fit_singles(search: Search) -> list[FittedHypothesis]:
         chosen, near, short = _shortlist(search, worth, ranked)
     else:
         chosen, near, short = [], {}, {}
-        for rank, places in enumerate(worth[: settings.most_singles]):
+        for rank, places in enumerate(worth[: attempts.settings.most_singles]):
             leads = rank < _EFFECTS_WITH_STARTS
             close = [e for e in places if gains[e] >= NEAR_PLACE * gains[places[0]]]
             # of the leading effects another place may yet be the one that leaves least

@@ -23,7 +23,6 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.channels import block_of, channel_of, unit_of
-from pamrs.diagnosis.evidence import no_inflation
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -32,7 +31,7 @@ from pamrs.diagnosis.fit import (
     residuals,
     stacked,
 )
-from pamrs.diagnosis.noise import correlation_time, excess, noise_levels
+from pamrs.diagnosis.noise import correlation_time, excess, no_inflation, noise_levels
 from pamrs.diagnosis.prepare import Prepared, Residual, implausible
 from pamrs.diagnosis.search._baseline import refitted, thorough
 from pamrs.errors import SimulationError
@@ -167,11 +166,10 @@ def find_misread(problem: Problem, nominal: Rig) -> Reading | None:
         nearly all of what it leaves.
     """
     every = list(_readings(problem, nominal))
-    settings = problem.settings
     small = [r for r in every if not r.offset and r.size < _SMALL_STEP]
     large = _worth_a_fit(problem, nominal, [r for r in every if r not in small])
     # what is no more than a gauge's slope may be off by tells nothing
-    small = [r for r in small if r.size >= _STDS * settings.gauge_error]
+    small = [r for r in small if r.size >= _STDS * problem.settings.gauge_error]
     if not (small or large):
         return None
     try:
@@ -224,7 +222,6 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     than noise from bin to bin: asked is the sum of squares, priors included, as the parameters
     follow the factor. Beside physics that is missing it is not told.
     """
-    settings = problem.settings
     reread = reading.read(problem)
     beyond = replace(reading, factors=tuple(factor**2 for factor in reading.factors)).read(problem)
     try:
@@ -244,7 +241,7 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     std = math.sqrt(max(1.0, after) / (2.0 * bend))
     step = math.log(reading.factors[0])
     gain = math.exp(step * best)
-    clear = abs(gain - 1.0) >= _STDS * settings.gauge_error
+    clear = abs(gain - 1.0) >= _STDS * problem.settings.gauge_error
     if not clear or abs(best - 1.0) > _STDS * std:
         return None
     before = _power(problem, was)
@@ -299,7 +296,6 @@ def _free_is_listed(problem: Problem, fitted: Fit, reading: Reading) -> bool:
     """True where a free factor (or offset), fitted with the parameters, would be that of the list;
     the problem is that of the reading.
     """
-    settings = problem.settings
     step = _FREE_STEP * (abs(reading.offset) or 1.0)
     factor, offset = (1.0, step) if reading.offset else (1.0 + step, 0.0)
     moved = replace(reading, factors=(factor,) * len(reading.channels), offset=offset)
@@ -326,14 +322,13 @@ def _free_is_listed(problem: Problem, fitted: Fit, reading: Reading) -> bool:
     weight = design @ inverse[:, 0]
     coloured = float(np.sum((weight * rows) ** 2)) * correlation_time(rows)
     spread = _STDS * math.sqrt(max(0.0, inverse[0, 0], coloured))
-    exact = settings.gauge_error * (abs(reading.offset) or 1.0)
+    exact = problem.settings.gauge_error * (abs(reading.offset) or 1.0)
     return away <= max(exact, spread) and away + spread <= _CLOSER * reading.size
 
 
 def _possible(problem: Problem, nominal: Rig) -> bool:
     """True where recordings read in this way can be of the rig at all."""
-    plausible = problem.settings
-    return not any(implausible(p.recording, nominal, plausible) for p in problem.recordings)
+    return not any(implausible(p.recording, nominal, problem.settings) for p in problem.recordings)
 
 
 def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:

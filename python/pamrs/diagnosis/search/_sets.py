@@ -13,11 +13,9 @@ import numpy as np
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     LEAST_TEMPERING,
-    Attempts,
     FittedHypothesis,
     Weighing,
     log_weight,
-    possible_gain,
     share_left,
     significant,
 )
@@ -32,6 +30,7 @@ from pamrs.diagnosis.screen import (
     by_effect,
     tangent_of,
 )
+from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, far_parameters
 from pamrs.effects import Hypothesis, Term
 
@@ -533,13 +532,6 @@ def far_above_noise(attempts: Attempts, candidate: FittedHypothesis) -> bool:
         for b in attempts.suspects
         for excess_by_block in (fit_excess, candidate.held_out_excess)
     )
-
-
-def cannot_gain(candidate: FittedHypothesis, attempts: Attempts) -> bool:
-    """True where no further one-parameter effect could pay for itself."""
-    evidence = attempts.settings
-    least = evidence.further_price + evidence.parameter_price
-    return possible_gain(candidate, attempts.compared) < least
 
 
 def log_misfit(candidate: FittedHypothesis) -> float:
