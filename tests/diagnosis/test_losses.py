@@ -14,7 +14,7 @@ from pamrs._losses import STRICT, Losses
 from pamrs.diagnosis.explain import _assemble
 from pamrs.diagnosis.model import _conclude
 from pamrs.diagnosis.next_experiment import _choice
-from pamrs.diagnosis.search import _attempts, _hypotheses
+from pamrs.diagnosis.search import _attempts, _examine, _hypotheses
 from pamrs.effects import Term
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
@@ -96,19 +96,19 @@ def test_steps_that_fail_cost_themselves(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 @pytest.mark.usefixtures("lenient")
 def test_blocks_whose_judgement_fails_cost_themselves(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = _hypotheses._begin_part
+    right = _examine._begin_part
 
     def begun(fitted: Any, held: Any, nominal: Any, blocks: Any, say: Any) -> Any:
         work = right if blocks[0].mechanical else broken
         return work(fitted, held, nominal, blocks, say)
 
-    monkeypatch.setattr(_hypotheses, "_begin_part", begun)
+    monkeypatch.setattr(_examine, "_begin_part", begun)
     found = diagnosed(RIG, shoulder, ("fit",))
     verdicts = {b: entry.verdict for entry in found.blocks for b in entry.blocks}
     assert verdicts.pop("arm") != "not_judged"
     assert verdicts == {"supply": "not_judged", "chamber": "not_judged"}
     assert found.warnings[0].startswith("the judgement of supply and chamber failed")
-    monkeypatch.setattr(_hypotheses, "_begin_part", broken)
+    monkeypatch.setattr(_examine, "_begin_part", broken)
     with pytest.raises(DiagnosisError, match="Singular matrix"):
         pamrs.diagnose(leaking())
 

@@ -276,7 +276,7 @@ def test_inside_the_error_of_the_model_effects_get_a_few_steps(
     screened = SimpleNamespace(strong=strong, scores=lambda: scores)
     search = SimpleNamespace(screened=screened, start=SimpleNamespace(fit=None))
     state = SimpleNamespace(search=search, per_recording=[], transient=[], wrong_values=["wrong"])
-    monkeypatch.setattr(_hypotheses, "_screen_mismatch", lambda refit, tell: state)
+    monkeypatch.setattr(_hypotheses, "screen_mismatch", lambda refit, tell: state)
     shortly = SimpleNamespace(fit_shortly=lambda starts, _: starts[0].effect.id)
     refit = SimpleNamespace(
         error=({}, {"arm": 1.0}),
@@ -285,4 +285,4 @@ def test_inside_the_error_of_the_model_effects_get_a_few_steps(
         with_error_sizes=lambda sizes: SimpleNamespace(attempts=shortly),
         with_smaller_error=lambda candidates: candidates,
     )
-    assert _hypotheses._refit_with_smaller_curve_error(refit, print) == ["start", *tried, "wrong"]
+    assert _hypotheses.refit_with_smaller_curve_error(refit, print) == ["start", *tried, "wrong"]

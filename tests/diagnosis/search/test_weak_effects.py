@@ -13,7 +13,7 @@ from pamrs.diagnosis.evidence import BlockLikelihood, FittedHypothesis, Weighing
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.fit import Events
 from pamrs.diagnosis.noise import Excess
-from pamrs.diagnosis.search import _hypotheses
+from pamrs.diagnosis.search import _baseline
 from pamrs.effects import Term
 from tests.diagnosis.asked import ROLES, SETTINGS, blocks_of
 from tests.diagnosis.likelihoods import BINS, TIMES, made_up, rows_of
@@ -205,8 +205,8 @@ def test_a_tube_is_named_in_all_blocks_that_it_acts_in() -> None:
 def test_a_parameter_that_only_held_out_recordings_show_is_a_parameter(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(_hypotheses, "_FITTED_HINT", 0.0)
-    monkeypatch.setattr(_hypotheses, "_HELD_OUT_RATIO", 1.3)
+    monkeypatch.setattr(_baseline, "_FITTED_HINT", 0.0)
+    monkeypatch.setattr(_baseline, "_HELD_OUT_RATIO", 1.3)
     said: list[str] = []
     known = RIG.parameter("arm.viscous")
     truth = RIG.with_parameters({"arm.viscous": known.value + 2.0 * known.tol})

@@ -140,8 +140,12 @@ def warnings(
     out = []
     groups = [j.group for j in judged]
     mistaken = any(j.wrong for j in judged)
-    starts = [j.group.candidates[0] for j in judged if not j.wrong]
-    symptoms = {n: v for start in starts for n, v in parameters_at_wall(start.fit).items()}
+    symptoms = {
+        name: far
+        for j in judged
+        if not j.wrong
+        for name, far in parameters_at_wall(j.group.candidates[0].fit).items()
+    }
     for recording in case.recordings:
         for channel, values in recording.channels.items():
             if (

@@ -8,7 +8,7 @@ Public: `examine` (all of it, for some blocks), `Mismatch`, `Attempts`, `parts_o
 from pamrs.diagnosis.search._attempts import Attempts, parts_of, start_of
 from pamrs.diagnosis.search._baseline import refitted, with_inflation
 from pamrs.diagnosis.search._closure import find_closure
-from pamrs.diagnosis.search._hypotheses import Mismatch, examine
+from pamrs.diagnosis.search._examine import Mismatch, examine
 from pamrs.diagnosis.search._readings import Reading, find_misread, reading_errors
 from pamrs.diagnosis.search._wrong_parameters import free_suspects, suspected_values
 
