@@ -8,19 +8,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
-from pamrs.diagnosis.fit import (
-    Fit,
-    Key,
-)
-from pamrs.diagnosis.noise import (
-    Excess,
-    NoiseLevel,
-)
+from pamrs.diagnosis.fit import Fit, Key
+from pamrs.diagnosis.noise import Excess, NoiseLevel
 from pamrs.diagnosis.prepare import Block
-from pamrs.effects import (
-    Hypothesis,
-    Term,
-)
+from pamrs.effects import Hypothesis, Term
 
 
 @dataclass(frozen=True, eq=False)

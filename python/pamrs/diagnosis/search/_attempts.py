@@ -54,12 +54,7 @@ from pamrs.diagnosis.noise import (
 )
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import (
-    Term,
-    effect_of,
-    find_parameter,
-    ports_of,
-)
+from pamrs.effects import Term, effect_of, find_parameter, ports_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig

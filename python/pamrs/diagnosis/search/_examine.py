@@ -28,12 +28,7 @@ from pamrs.diagnosis.evidence import (
     weigh,
     weigh_only_noise,
 )
-from pamrs.diagnosis.fit import (
-    Problem,
-    Start,
-    acts_in,
-    concerns,
-)
+from pamrs.diagnosis.fit import Problem, Start, acts_in, concerns
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import by_effect
 from pamrs.diagnosis.search._attempts import Attempts
@@ -57,16 +52,9 @@ from pamrs.diagnosis.search._hypotheses import (
     screen_mismatch,
     weigh_to_the_end,
 )
-from pamrs.diagnosis.search._sets import (
-    Say,
-    Search,
-)
+from pamrs.diagnosis.search._sets import Say, Search
 from pamrs.diagnosis.search._wrong_parameters import free_suspects
-from pamrs.effects import (
-    UNDECIDED,
-    UNLISTED,
-    Hypothesis,
-)
+from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
@@ -154,7 +142,7 @@ def examine(
 def _begin_part(
     fit_problem: Problem, held_out_problem: Problem, nominal: Rig, blocks: list[Block], say: Say
 ) -> Mismatch | OnlyNoise:
-    """Examine some blocks alone: a mismatch with its hypotheses, or a group that keeps noise."""
+    """Examine some blocks alone: a mismatch with its hypotheses, or only noise."""
     fit_problem, held_out_problem = (
         replace(problem, blocks=blocks) for problem in (fit_problem, held_out_problem)
     )

@@ -19,18 +19,8 @@ from pamrs.diagnosis.evidence import (
     same_recordings,
     weigh,
 )
-from pamrs.diagnosis.fit import (
-    Fit,
-    Start,
-    acts_in,
-    fits,
-    form_in,
-    same_data_in,
-    two_at_a_time,
-)
-from pamrs.diagnosis.noise import (
-    LEAST_SIZE,
-)
+from pamrs.diagnosis.fit import Fit, Start, acts_in, fits, form_in, same_data_in, two_at_a_time
+from pamrs.diagnosis.noise import LEAST_SIZE
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, best_of_each_kind, by_effect, screen
 from pamrs.diagnosis.search._attempts import Attempts
@@ -49,13 +39,7 @@ from pamrs.diagnosis.search._sets import (
     with_freed_values,
 )
 from pamrs.diagnosis.search._wrong_parameters import free_suspects
-from pamrs.effects import (
-    CATALOGUE,
-    EFFECTS,
-    Hypothesis,
-    SameData,
-    Term,
-)
+from pamrs.effects import CATALOGUE, EFFECTS, Hypothesis, SameData, Term
 
 _LEAST_GAIN_SHARE = 0.08  # share of the largest gain from which an effect is fitted (decision 13)
 # share of an effect's best gain from which another of its starts is fitted (decision 13)

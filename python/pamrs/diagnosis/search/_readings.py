@@ -23,14 +23,7 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.channels import block_of, channel_of, unit_of
-from pamrs.diagnosis.fit import (
-    Fit,
-    Problem,
-    free_baseline,
-    known_parameters,
-    residuals,
-    stacked,
-)
+from pamrs.diagnosis.fit import Fit, Problem, free_baseline, known_parameters, residuals, stacked
 from pamrs.diagnosis.noise import correlation_time, excess, no_inflation, noise_levels
 from pamrs.diagnosis.prepare import Prepared, Residual, implausible
 from pamrs.diagnosis.search._baseline import refitted, thorough

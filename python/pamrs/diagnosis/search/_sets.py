@@ -22,14 +22,7 @@ from pamrs.diagnosis.evidence import (
 from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
 from pamrs.diagnosis.noise import with_sizes
 from pamrs.diagnosis.prepare import Block
-from pamrs.diagnosis.screen import (
-    Score,
-    Screen,
-    Tangent,
-    best_of_each_kind,
-    by_effect,
-    tangent_of,
-)
+from pamrs.diagnosis.screen import Score, Screen, Tangent, best_of_each_kind, by_effect, tangent_of
 from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, far_parameters
 from pamrs.effects import Hypothesis, Term
