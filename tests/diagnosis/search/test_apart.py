@@ -12,7 +12,7 @@ from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, Weighing, jud
 from pamrs.diagnosis.fit import Fit, Problem
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.diagnosis.search._attempts import Attempts
+from pamrs.diagnosis.search import Attempts
 from pamrs.diagnosis.search._examine import _split_by_names
 from pamrs.effects import UNLISTED, Hypothesis
 from pamrs.findings import case_verdict

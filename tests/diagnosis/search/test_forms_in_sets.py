@@ -17,7 +17,7 @@ from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, significant
 from pamrs.diagnosis.fit import fit, form_in, starts_of
 from pamrs.diagnosis.model import owners_of_effects
 from pamrs.diagnosis.screen import screen
-from pamrs.diagnosis.search._attempts import Attempts
+from pamrs.diagnosis.search import Attempts
 from pamrs.diagnosis.search._sets import _STRONG_RATIO, Search, far_above_noise, in_best_forms
 from pamrs.effects import Term
 from tests.diagnosis.again import case

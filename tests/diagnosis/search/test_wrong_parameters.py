@@ -14,9 +14,8 @@ import pytest
 import pamrs
 from pamrs.diagnosis.evidence import FittedHypothesis
 from pamrs.diagnosis.fit import Problem, fit
+from pamrs.diagnosis.search import Attempts, suspected_values
 from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
-from pamrs.diagnosis.search import suspected_values
-from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, _needless
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
