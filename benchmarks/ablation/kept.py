@@ -71,7 +71,7 @@ def _recorded(without: str) -> Iterator[tuple[list[Weighed], set[str]]]:
         groups = divided(self, say)
         for group in groups:
             # of an undivided mismatch more blocks may be compared than have an excess
-            compared = self.search.trial.compared if len(groups) == 1 else group.suspects
+            compared = self.search.attempts.compared if len(groups) == 1 else group.suspects
             light = [_light(c) for c in group.candidates]
             weighed.append(Weighed(light, compared, self.search.weighing))
         return groups

@@ -20,7 +20,7 @@ _WEIGHING = "pamrs.diagnosis.evidence._weighing"
 
 #: what is left out of the weighing: names of its module, and what stands in their place
 WEIGHTS: dict[str, dict[str, Any]] = {
-    "more of the evidence counts near the noise": {"_counted": lambda *_: 0.02},
+    "more of the evidence counts near the noise": {"_tempering": lambda *_: 0.02},
     "forms of equations err": {"_FORM_ERROR": 0.0},
     "noise levels err": {"_LEAST_ERROR": 1e-6},
     "a right name may be missed": {"_MISSED_ODDS": 0.0},

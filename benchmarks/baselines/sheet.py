@@ -16,7 +16,7 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import FINAL_STEP_SHARE, Fit, Key, Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.noise import NoiseLevel, bins_of, noise_levels
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, available_blocks, binned, prepare
-from pamrs.diagnosis.search import refitted, with_autocorrelation
+from pamrs.diagnosis.search import refitted, with_inflation
 from pamrs.errors import SimulationError
 from pamrs.recordings import load_case
 from pamrs.rig import Rig
@@ -132,7 +132,7 @@ def _refitted(inner: Problem, nominal: Rig) -> tuple[Fit, Fit | None]:
     far as a diagnosis lets a freed parameter go (None where that model cannot be run).
     """
     first = refitted(inner, nominal, dict.fromkeys((b.name for b in inner.blocks), 1.0))
-    best, weights = with_autocorrelation(inner, nominal, first, {})
+    best, inflation = with_inflation(inner, nominal, first, {})
     own = inner.settings
     try:
         free = fit(
@@ -140,7 +140,7 @@ def _refitted(inner: Problem, nominal: Rig) -> tuple[Fit, Fit | None]:
             nominal,
             (),
             {},
-            weights,
+            inflation,
             warm=best,
             freed=tuple(free_baseline(inner, nominal)),
             evaluations=own.baseline_evaluations,

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts
 from pamrs.diagnosis.noise import noise_levels
+from pamrs.diagnosis.search import Attempts
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.diagnosis.asked import problem_of
@@ -44,7 +44,7 @@ def held(conductance: float, seconds: float, **options: Any) -> pamrs.Case:
     return pamrs.Case("hold", RIG, [hold(conductance, seconds, **options)], Path())
 
 
-def attempts(plant: pamrs.Rig, pressures: Sequence[float], noise: float) -> Attempts:
+def attempts_at(plant: pamrs.Rig, pressures: Sequence[float], noise: float) -> Attempts:
     """A minute from each gauge pressure [Pa] at 10 Hz with so much noise [Pa], the last hold held
     out.
     """
@@ -55,8 +55,12 @@ def attempts(plant: pamrs.Rig, pressures: Sequence[float], noise: float) -> Atte
         kept.append(driven(plant, f"hold{seed}", "fit", 0.1, {}, sizes, [7, seed], **given))
     every = problem_of(RIG, kept)
     blocks, core, found = every.blocks, every.core, every.recordings
-    inner, outer = (replace(every, recordings=some) for some in (found[:-1], found[-1:]))
-    levels = noise_levels(inner, core_rig(plant, core)) | noise_levels(outer, core_rig(plant, core))
+    fit_problem, held_out_problem = (
+        replace(every, recordings=some) for some in (found[:-1], found[-1:])
+    )
+    levels = noise_levels(fit_problem, core_rig(plant, core)) | noise_levels(
+        held_out_problem, core_rig(plant, core)
+    )
     # what the baseline leaves: it only scales the gap that is closed
     out = {block.name: SimpleNamespace(ratio=9.0) for block in blocks}
-    return Attempts(inner, outer, RIG, levels, cast("Any", out), blocks)
+    return Attempts(fit_problem, held_out_problem, RIG, levels, cast("Any", out), blocks)

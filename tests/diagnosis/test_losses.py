@@ -11,11 +11,10 @@ import pytest
 import pamrs
 from pamrs._arrays import solve_normal
 from pamrs._losses import STRICT, Losses
-from pamrs.diagnosis.evidence import _candidates
 from pamrs.diagnosis.explain import _assemble
 from pamrs.diagnosis.model import _conclude
 from pamrs.diagnosis.next_experiment import _choice
-from pamrs.diagnosis.search import _hypotheses
+from pamrs.diagnosis.search import _attempts, _examine, _hypotheses
 from pamrs.effects import Term
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
@@ -57,14 +56,14 @@ def told(found: pamrs.Diagnosis) -> list[str]:
 
 @pytest.mark.usefixtures("lenient")
 def test_a_hypothesis_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = _candidates.fit
+    right = _attempts.fit
 
     def fit(problem: Any, nominal: Any, effects: Any, *rest: Any, **options: Any) -> Any:
         return (broken if Term("heat_transfer") in effects else right)(
             problem, nominal, effects, *rest, **options
         )
 
-    monkeypatch.setattr(_candidates, "fit", fit)
+    monkeypatch.setattr(_attempts, "fit", fit)
     found = pamrs.diagnose(leaking())
     assert found.effects[0].id == "leak_muscle"
     assert found.warnings[0] == told(found)[0]
@@ -97,19 +96,19 @@ def test_steps_that_fail_cost_themselves(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 @pytest.mark.usefixtures("lenient")
 def test_blocks_whose_judgement_fails_cost_themselves(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = _hypotheses._begin_part
+    right = _examine._begin_part
 
     def begun(fitted: Any, held: Any, nominal: Any, blocks: Any, say: Any) -> Any:
         work = right if blocks[0].mechanical else broken
         return work(fitted, held, nominal, blocks, say)
 
-    monkeypatch.setattr(_hypotheses, "_begin_part", begun)
+    monkeypatch.setattr(_examine, "_begin_part", begun)
     found = diagnosed(RIG, shoulder, ("fit",))
     verdicts = {b: entry.verdict for entry in found.blocks for b in entry.blocks}
     assert verdicts.pop("arm") != "not_judged"
     assert verdicts == {"supply": "not_judged", "chamber": "not_judged"}
     assert found.warnings[0].startswith("the judgement of supply and chamber failed")
-    monkeypatch.setattr(_hypotheses, "_begin_part", broken)
+    monkeypatch.setattr(_examine, "_begin_part", broken)
     with pytest.raises(DiagnosisError, match="Singular matrix"):
         pamrs.diagnose(leaking())
 

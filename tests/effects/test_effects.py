@@ -161,7 +161,7 @@ def test_the_diagnosis_knows_where_an_effect_acts_and_where_to_begin(effect: str
         for start in starts:
             parameters = EFFECTS[effect].form(start.form).parameters
             restricting = {f"{effect}.{p.name}" for p in parameters if p.restricts}
-            assert {*start.free, *start.held} == {f"{effect}.{p.name}" for p in parameters}
+            assert {*start.free, *start.fixed} == {f"{effect}.{p.name}" for p in parameters}
             assert all(value != 0.0 for name, value in start.free.items() if name in start.sizes)
             half = start.scaled(0.5)
             assert all(

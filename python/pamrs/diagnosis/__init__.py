@@ -8,9 +8,8 @@ other and with "unlisted" on held-out recordings.
 
 Public are `diagnose`, `missing_input`, `Diagnosis`, `DiagnosisSettings`, and these packages and
 modules, each with its own list: `settings` (what a user may change), `result` (what is returned),
-`ready` (what is looked at before any fit), and the steps in the order in which they work:
-`prepare`, `fit`, `noise`, `missing`, `screen`, `evidence`, `search`, `model`, `next_experiment`,
-`explain`.
+`ready` (what is looked at before any fit), and the layers, lowest first: `prepare`, `fit`, `noise`,
+`missing`, `screen`, `evidence`, `search`, `model`, `limits`, `next_experiment`, `laws`, `explain`.
 """
 
 from __future__ import annotations
@@ -94,7 +93,7 @@ def _unknown_parameters(rig: Rig) -> list[str]:
     return [name for name in unknown if channel_of(name) in moving]
 
 
-def _capped(group: BlockGroup, factor: float) -> BlockGroup:
+def _scaled_for_unknown_geometry(group: BlockGroup, factor: float) -> BlockGroup:
     """Scale down all names in a group of moving blocks; ``unlisted`` gets the rest."""
     if group.mismatch is None or not group.mismatch.mechanical:
         return group
@@ -242,7 +241,7 @@ def _answer_without_unfollowed(
 ) -> tuple[Diagnosis, Ready]:
     """Diagnose a case without recordings that its model cannot follow; return that case too."""
     try:
-        return _diagnose_ready(ready, settings, considered, say), ready
+        return _diagnosis_of_ready_case(ready, settings, considered, say), ready
     except Unfollowed as error:
         unfollowed = error
     why = f"the model cannot follow it ({unfollowed})"
@@ -253,45 +252,51 @@ def _answer_without_unfollowed(
     return _answer_without_unfollowed(rest, settings, considered, say)
 
 
-def _diagnose_ready(
+def _diagnosis_of_ready_case(
     ready: Ready, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...], say: Steps
 ) -> Diagnosis:
-    """Diagnose a case that passed the checks before any fit."""
+    """Diagnosis of a case that passed the checks before any fit: as one of another unit where one
+    explains what the model misses, else of its physics.
+    """
     case = ready.case
     shortened, counts = averaged_to_need(case.recordings, ready.blocks, case.name, settings)
     case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings", _JUDGED[0] / 2)
-    inner, outer, unjudged, start_notes = _problems(case, settings, considered)
-    part, moved = partial(inner.losses.part, through=(PamrsError,)), list[str]()
-    misread = part("the search for other units", lambda: find_misread(inner, case.rig))
+    fit_problem, held_out_problem, unjudged, start_notes = _problems(case, settings, considered)
+    part, moved = partial(fit_problem.losses.part, through=(PamrsError,)), list[str]()
+    misread = part("the search for other units", lambda: find_misread(fit_problem, case.rig))
     if misread is not None:
-        errors = {"fit": reading_errors(case.rig, inner, misread), "held_out": {}}
-        if outer is not inner:
-            errors["held_out"] = reading_errors(case.rig, outer, misread)
-        diagnosis = misread_diagnosis(case, inner, misread, unjudged, errors)
+        errors = {"fit": reading_errors(case.rig, fit_problem, misread), "held_out": {}}
+        if held_out_problem is not fit_problem:
+            errors["held_out"] = reading_errors(case.rig, held_out_problem, misread)
+        diagnosis = misread_diagnosis(case, fit_problem, misread, unjudged, errors)
     else:
         shifted = part(
-            "the search for offsets of commands", lambda: _with_offsets(inner, outer, case.rig)
+            "the search for offsets of commands",
+            lambda: _with_offsets(fit_problem, held_out_problem, case.rig),
         )
-        inner, outer, moved = shifted or (inner, outer, [])
-        stated, judged, unjudged = _diagnose_physics(case, inner, outer, unjudged, say)
+        fit_problem, held_out_problem, moved = shifted or (fit_problem, held_out_problem, [])
+        stated, judged, unjudged = _diagnosis_in_units_said(
+            case, fit_problem, held_out_problem, unjudged, say
+        )
         what = "the look at other laws of the rig"
-        diagnosis = inner.losses.part(
-            what, lambda: _under_best_law(case, considered, inner, stated), stated
+        diagnosis = fit_problem.losses.part(
+            what, lambda: _under_best_law(case, considered, fit_problem, stated), stated
         )
-        inner = judged
+        fit_problem = judged
     # the first few are all that a terminal shows: first what may make the answer wrong
     # a unit that is found settles what was doubted under the one that was said
     doubts = ready.doubts if misread is None else []
-    warnings = [*inner.losses.told, *ready.suspected, *doubts, *start_notes, *ready.told]
+    warnings = [*fit_problem.losses.told, *ready.suspected, *doubts, *start_notes, *ready.told]
     warnings += [*diagnosis.warnings, *ready.masked, *moved]
     values_of = {
-        p.recording.name: p.recording.parameters for p in (*inner.recordings, *outer.recordings)
+        p.recording.name: p.recording.parameters
+        for p in (*fit_problem.recordings, *held_out_problem.recordings)
     }
     recordings = [
         replace(r, parameters=values_of.get(r.name, r.parameters)) for r in case.recordings
     ]
-    data = data_used(recordings, counts, inner.blocks, case.rig, inner.core, unjudged)
+    data = data_used(recordings, counts, fit_problem.blocks, case.rig, fit_problem.core, unjudged)
     return replace(diagnosis, warnings=warnings, data=data)
 
 
@@ -316,49 +321,60 @@ def _case_with_own_model(case: Any, data: Any, *, allow_outside: bool) -> Case:
     return case if isinstance(case, Case) else load_case(case, allow_outside=allow_outside)
 
 
-def _diagnose_physics(
-    case: Case, inner: Problem, outer: Problem, unjudged: list[Unjudged], say: Steps
+def _diagnosis_in_units_said(
+    case: Case,
+    fit_problem: Problem,
+    held_out_problem: Problem,
+    unjudged: list[Unjudged],
+    say: Steps,
 ) -> tuple[Diagnosis, Problem, list[Unjudged]]:
-    """Diagnose physics: the result, recordings with judged blocks, and unjudged blocks."""
-    every = inner.blocks
-    motion = [b for b in inner.blocks if b.mechanical]
-    parts = [[b for b in inner.blocks if not b.mechanical], motion]
-    groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
-    inner, outer = _judged_only(inner, outer, groups)
+    """Diagnosis once no wrong unit was found; with it the recordings with the blocks that were
+    judged, and those that were not.
+    """
+    every = fit_problem.blocks
+    motion = [b for b in fit_problem.blocks if b.mechanical]
+    parts = [[b for b in fit_problem.blocks if not b.mechanical], motion]
+    groups = examine(fit_problem, held_out_problem, case.rig, [part for part in parts if part], say)
+    fit_problem, held_out_problem = _judged_only(fit_problem, held_out_problem, groups)
     missed = [b for group in groups if group.mismatch is not None for b in group.blocks]
-    slack = inner.losses.part(
-        "the look at slack muscles", lambda: notes_on_slack(case.rig, missed, inner.recordings), []
+    slack = fit_problem.losses.part(
+        "the look at slack muscles",
+        lambda: notes_on_slack(case.rig, missed, fit_problem.recordings),
+        [],
     )
     unsettled = _unknown_parameters(case.rig) if motion else []
     if unsettled:
-        groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
+        groups = [_scaled_for_unknown_geometry(g, _UNKNOWN_GEOMETRY_PROBABILITY) for g in groups]
     say("putting the answer together", _JUDGED[1])
-    judged_names, failed = {block.name for block in inner.blocks}, "its judgement failed"
+    judged_names, failed = {block.name for block in fit_problem.blocks}, "its judgement failed"
     unjudged += [Unjudged(b.name, b.covers, failed) for b in every if b.name not in judged_names]
-    conclusion = conclude(case.rig, inner, outer, groups)
-    diagnosis = assemble(case, inner, outer, groups, conclusion, unjudged)
-    proposal = inner.losses.part(
+    conclusion = conclude(case.rig, fit_problem, held_out_problem, groups)
+    diagnosis = assemble(case, fit_problem, held_out_problem, groups, conclusion, unjudged)
+    proposal = fit_problem.losses.part(
         "the next experiment",
         lambda: next_to_record(
             diagnosis,
             conclusion.ambiguity,
-            conclusion.hypotheses(inner),
+            conclusion.hypotheses(fit_problem),
             case.rig,
             conclusion.judged,
-            inner,
-            outer,
+            fit_problem,
+            held_out_problem,
         ),
         NextExperiment(""),
     )
-    missing = inner.losses.part(
-        "the missing input", lambda: _missing(diagnosis.answer, conclusion, inner, outer)
+    missing = fit_problem.losses.part(
+        "the missing input",
+        lambda: _missing(diagnosis.answer, conclusion, fit_problem, held_out_problem),
     )
     where = diagnosis.where
     if missing is not None and missing.times:
         first = missing.times[0].recording
         spans = [[t.start, t.stop] for t in missing.times if t.recording == first]
         where = replace(where, recording=first, intervals=sorted(spans))
-    limits = inner.losses.part("the limits", lambda: _limits(conclusion, inner, outer), [])
+    limits = fit_problem.losses.part(
+        "the limits", lambda: _limits(conclusion, fit_problem, held_out_problem), []
+    )
     diagnosis = replace(
         diagnosis,
         where=where,
@@ -375,31 +391,33 @@ def _diagnose_physics(
             f"move is capped at {100 * _UNKNOWN_GEOMETRY_PROBABILITY:.0f} %"
         )
         diagnosis = replace(diagnosis, warnings=[warning, *diagnosis.warnings])
-    return diagnosis, inner, unjudged
+    return diagnosis, fit_problem, unjudged
 
 
 def _under_best_law(
-    case: Case, considered: tuple[Hypothesis, ...], inner: Problem, stated: Diagnosis
+    case: Case, considered: tuple[Hypothesis, ...], fit_problem: Problem, stated: Diagnosis
 ) -> Diagnosis:
     """Diagnosis under the best of other laws where the rig file's laws leave a mismatch."""
 
     def divided(rig: Rig) -> tuple[Problem, Problem, list[Unjudged]]:
-        fitted, held_out, unjudged, _ = _problems(case.with_rig(rig), inner.settings, considered)
+        fitted, held_out, unjudged, _ = _problems(
+            case.with_rig(rig), fit_problem.settings, considered
+        )
         return *_with_offsets(fitted, held_out, rig)[:2], unjudged
 
     best, quiet = stated, Steps(None, within=_JUDGED)
-    for choice, recordings in promising_laws(case.rig, inner, stated, divided):
+    for choice, recordings in promising_laws(case.rig, fit_problem, stated, divided):
         with suppress(PamrsError):  # a rig that these recordings cannot be of
-            other, _, _ = _diagnose_physics(case.with_rig(choice.rig), *recordings, quiet)
+            other, _, _ = _diagnosis_in_units_said(case.with_rig(choice.rig), *recordings, quiet)
             best = under(choice, other, stated) if is_better(other, best) else best
     return best
 
 
 def _missing(
-    answer: Answer, conclusion: Conclusion, inner: Problem, outer: Problem
+    answer: Answer, conclusion: Conclusion, fit_problem: Problem, held_out_problem: Problem
 ) -> MissingInput | None:
     """Missing input of the answer's block; None where it is noise, or was not followed."""
-    block = next((b for b in inner.blocks if b.name == answer.block), None)
+    block = next((b for b in fit_problem.blocks if b.name == answer.block), None)
     if block is None:
         return None
     models = conclusion.models
@@ -407,21 +425,21 @@ def _missing(
     missing = missing_input_of(
         block,
         core_rig(models.baseline),
-        _by_role(inner, outer),
+        _by_role(fit_problem, held_out_problem),
         conclusion.noise_level,
         named=core_rig(models.final) if named else None,
-        margin=inner.settings.noise_margin,
+        margin=fit_problem.settings.noise_margin,
     )
     followed = missing is not None and missing.share > 0.0 and missing.noises_after < MOST_MISSED
     return missing.thinned(_MOST_POINTS) if missing is not None and followed else None
 
 
-def _limits(conclusion: Conclusion, inner: Problem, outer: Problem) -> list[Limit]:
+def _limits(conclusion: Conclusion, fit_problem: Problem, held_out_problem: Problem) -> list[Limit]:
     """Sizes from which the recordings would have shown effects, and distinguished them."""
-    every, baseline = _all_recordings(inner, outer), conclusion.models.baseline
+    every, baseline = _all_recordings(fit_problem, held_out_problem), conclusion.models.baseline
     beyond_noise = {
         b.name: beyond(error.after, error.noise, conclusion.own_errors[b.channel])
-        for b in inner.blocks
+        for b in fit_problem.blocks
         if (error := conclusion.table.get(b.channel))
     }
     return limits_of(
@@ -429,15 +447,18 @@ def _limits(conclusion: Conclusion, inner: Problem, outer: Problem) -> list[Limi
     )
 
 
-def _all_recordings(inner: Problem, outer: Problem) -> Problem:
+def _all_recordings(fit_problem: Problem, held_out_problem: Problem) -> Problem:
     """All recordings, of every role."""
-    return replace(inner, recordings=[p for part in _by_role(inner, outer).values() for p in part])
+    return replace(
+        fit_problem,
+        recordings=[p for part in _by_role(fit_problem, held_out_problem).values() for p in part],
+    )
 
 
-def _by_role(inner: Problem, outer: Problem) -> dict[str, list[Prepared]]:
+def _by_role(fit_problem: Problem, held_out_problem: Problem) -> dict[str, list[Prepared]]:
     """Recordings by their role."""
-    held_out = {} if outer is inner else {"held_out": outer.recordings}
-    return {"fit": inner.recordings, **held_out}
+    held_out = {} if held_out_problem is fit_problem else {"held_out": held_out_problem.recordings}
+    return {"fit": fit_problem.recordings, **held_out}
 
 
 def missing_input(
@@ -499,12 +520,16 @@ def missing_input(
     name = ready.case.name
     shortened, _ = averaged_to_need(ready.case.recordings, ready.blocks, name, chosen)
     with _in_range(name):
-        inner, outer, _, _ = _problems(replace(ready.case, recordings=shortened), chosen, ())
-        inner, outer, _ = _with_offsets(inner, outer, ready.case.rig)
-        roles = _by_role(inner, outer)
-        every = _all_recordings(inner, outer)
+        fit_problem, held_out_problem, _, _ = _problems(
+            replace(ready.case, recordings=shortened), chosen, ()
+        )
+        fit_problem, held_out_problem, _ = _with_offsets(
+            fit_problem, held_out_problem, ready.case.rig
+        )
+        roles = _by_role(fit_problem, held_out_problem)
+        every = _all_recordings(fit_problem, held_out_problem)
         if block is not None:
-            by_name = {b.name: b for b in inner.blocks}
+            by_name = {b.name: b for b in fit_problem.blocks}
             if block not in by_name:
                 suggestion = meant(str(block), by_name)
                 raise ParameterError(f"block = {block!r} is not allowed; {suggestion}")
@@ -523,19 +548,24 @@ def missing_input(
 
 
 def _judged_only(
-    inner: Problem, outer: Problem, groups: list[BlockGroup]
+    fit_problem: Problem, held_out_problem: Problem, groups: list[BlockGroup]
 ) -> tuple[Problem, Problem]:
     """Recordings without the blocks whose judgement failed."""
     judged = {block.name for group in groups for block in group.blocks}
     if not judged:
-        raise DiagnosisError("; ".join(inner.losses.told))
-    fitted = replace(inner, blocks=[b for b in inner.blocks if b.name in judged])
-    return fitted, fitted if outer is inner else replace(outer, blocks=fitted.blocks)
+        raise DiagnosisError("; ".join(fit_problem.losses.told))
+    fitted = replace(fit_problem, blocks=[b for b in fit_problem.blocks if b.name in judged])
+    same, blocks = held_out_problem is fit_problem, fitted.blocks
+    return fitted, fitted if same else replace(held_out_problem, blocks=blocks)
 
 
-def _with_offsets(inner: Problem, outer: Problem, rig: Rig) -> tuple[Problem, Problem, list[str]]:
+def _with_offsets(
+    fit_problem: Problem, held_out_problem: Problem, rig: Rig
+) -> tuple[Problem, Problem, list[str]]:
     """Recordings, fitted and held out, with commands at the times they acted, and notes on that."""
-    shifted, notes = with_offsets([inner] if outer is inner else [inner, outer], rig)
+    shifted, notes = with_offsets(
+        [fit_problem] if held_out_problem is fit_problem else [fit_problem, held_out_problem], rig
+    )
     return shifted[0], shifted[-1], notes
 
 
@@ -547,14 +577,14 @@ def _checked_suspicions(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, 
         )
     free = [name for name, parameter in rig.parameters.items() if parameter.tol > 0.0]
     possible = [e for e in CATALOGUE if fits(rig, e)]
-    held = {entry["id"] for entry in rig.effects}
+    nominal_effects = {entry["id"] for entry in rig.effects}
     sets = (tuple(Term.parse(word.strip()) for word in text.split("+")) for text in consider)
     hypotheses = list(map(Hypothesis, sets))
     for text, hypothesis in zip(consider, hypotheses, strict=True):
         if len(hypothesis.set) < len(hypothesis.terms):
             raise ValueError(f"consider: {text!r} is not allowed: it has a name twice")
     for term in (term for hypothesis in hypotheses for term in hypothesis.terms):
-        if term.is_effect and term.id in held:
+        if term.is_effect and term.id in nominal_effects:
             raise ValueError(
                 f"consider: {str(term)!r} is not allowed: the model holds it already, and it is "
                 "refitted"
@@ -617,20 +647,22 @@ def _problems(
             + f"); at least {100 * least:.0f} % are needed"
             + "".join(f"; {text}" for text in start_notes)
         )
-    inner = Problem(blocks, fitted, core, settings, considered=considered)
-    drowned = _regulators_in_noise(inner, rig)
+    fit_problem = Problem(blocks, fitted, core, settings, considered=considered)
+    drowned = _regulators_in_noise(fit_problem, rig)
     left_out = [b for b in every if b.name in thin or b.name in drowned]
-    inner = replace(inner, blocks=[b for b in blocks if b.name not in drowned])
-    if not inner.blocks:
+    fit_problem = replace(fit_problem, blocks=[b for b in blocks if b.name not in drowned])
+    if not fit_problem.blocks:
         text = "; ".join(f"block {name}: {reason}" for name, reason in drowned.items())
         raise DiagnosisError(f"case {case.name!r}: {text}")
-    check_sense(inner.blocks, [*fitted, *held_out], inner.core, case.name)
+    check_sense(fit_problem.blocks, [*fitted, *held_out], fit_problem.core, case.name)
     why = {
         name: f"only {100 * share:.0f} % of its samples are usable" for name, share in thin.items()
     } | drowned
     unjudged = [*without, *(Unjudged(b.name, b.covers, why[b.name]) for b in left_out)]
-    outer = replace(inner, recordings=held_out) if held_out else inner
-    start_notes += notes_on_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
-    start_notes += notes_on_tanks(rig, inner.blocks, inner.recordings)
+    held_out_problem = replace(fit_problem, recordings=held_out) if held_out else fit_problem
+    start_notes += notes_on_beginnings(
+        fit_problem.blocks, [*fit_problem.recordings, *held_out_problem.recordings]
+    )
+    start_notes += notes_on_tanks(rig, fit_problem.blocks, fit_problem.recordings)
     start_notes += notes_on_own_values([*fitted, *held_out])
-    return inner, outer, unjudged, start_notes
+    return fit_problem, held_out_problem, unjudged, start_notes

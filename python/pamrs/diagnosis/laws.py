@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from pamrs.diagnosis.evidence import without_autocorrelation
 from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.noise import no_inflation
 from pamrs.diagnosis.prepare import Unjudged
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import refitted
@@ -67,7 +67,7 @@ def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:
     if len(blocks) < len(names):
         return math.inf
     part = replace(problem, blocks=blocks)
-    return 2.0 * refitted(part, rig, without_autocorrelation(blocks)).cost
+    return 2.0 * refitted(part, rig, no_inflation(blocks)).cost
 
 
 def is_better(other: Diagnosis, stated: Diagnosis) -> bool:

@@ -139,7 +139,7 @@ def products_of(
             )
             means, counts = binned(free * tolerances, base_residual.rows, bins_of(prepared))
             curves = np.empty((means.shape[0], 0)) if level.curves is None else level.curves
-            noise = level.noise * max(1.0, (unexplained or {}).get(block.name, 1.0))
+            noise = level.binned_noise * max(1.0, (unexplained or {}).get(block.name, 1.0))
             share = counted(prepared, block, problem.settings) / max(1, int((counts > 0).sum()))
             weights[place] = math.sqrt(share) / noise if noise > 0.0 else 0.0
             columns[place] = [curves, means, np.zeros((means.shape[0], len(starts)))]

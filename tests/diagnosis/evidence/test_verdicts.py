@@ -249,7 +249,7 @@ def test_less_than_half_a_noise_level_is_no_physics_without_a_name(
 ) -> None:
     own = group("chamber", {"unlisted": 1.0}, shifted=True)
     size = {"chamber": Excess(3.0, left, 0.0, 1.0, 1.0, 1.1)}
-    base = replace(own.candidates[0], fitted=size, held_out=size)
+    base = replace(own.candidates[0], fit_excess=size, held_out_excess=size)
     (found,) = judge([replace(own, candidates=[base])], SETTINGS)
     assert found.verdict == verdict
     chance = found.probabilities[Hypothesis((), "unlisted")]

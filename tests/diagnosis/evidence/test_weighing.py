@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, possible_gain, weigh
+from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, possible_gain, weigh
 from pamrs.diagnosis.evidence._likelihood import _Covariance
-from pamrs.diagnosis.evidence._verdicts import _capped
+from pamrs.diagnosis.evidence._verdicts import _with_capped_names
 from pamrs.diagnosis.evidence._weighing import loss_by_values
 from pamrs.diagnosis.fit import Events, Fit, Problem, Start, fits
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.diagnosis.screen import Score
-from pamrs.diagnosis.search import _hypotheses
+from pamrs.diagnosis.search import Attempts, _hypotheses
 from pamrs.effects import EFFECTS, NONE, UNLISTED, Hypothesis, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
@@ -52,7 +52,11 @@ def hypothesis(
     std = {name: spread for name, (_, spread) in known.items()}
     spreads = np.array(list(std.values()))
     alike = correlation + (1.0 - correlation) * np.eye(len(spreads))
-    fitted = {"std": std, "covariance": np.outer(spreads, spreads) * alike, "events": events}
+    fitted = {
+        "std": std,
+        "covariance": np.outer(spreads, spreads) * alike,
+        "events": events,
+    }
     kept = {"arm": Excess(1.0 + left * (BEFORE - 1.0), 0.0, 0.5, 1.0, 1.0, 1.2, 0.05)}
     return made_up(RIG, "+".join(effects), kept, values, **fitted)
 
@@ -152,11 +156,11 @@ def test_what_follows_a_curve_of_the_model_is_not_left_by_a_name() -> None:
 def test_names_that_groups_agree_on_are_capped() -> None:
     most = SETTINGS.most_probability
     own = {Hypothesis(terms("muscle_creep")): 50.0, UNLISTED: 0.1, NONE: 0.1}
-    found = _capped(own, most)
+    found = _with_capped_names(own, most)
     assert sum(found.values()) == pytest.approx(sum(own.values()))
     assert found[Hypothesis(terms("muscle_creep"))] == pytest.approx(most * 50.2)
     unsure = {Hypothesis(terms("muscle_creep")): 0.5, UNLISTED: 0.5}
-    assert _capped(unsure, most) == unsure
+    assert _with_capped_names(unsure, most) == unsure
 
 
 def test_a_second_name_pays_for_itself_or_is_not_believed() -> None:
@@ -180,13 +184,13 @@ def test_an_effect_that_the_file_states_as_uncertain_is_a_parameter(tmp_path: Pa
 def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
     """Other events and wrong values beside them are not fitted."""
     problem = Problem(BLOCKS, [], core_rig(RIG), SETTINGS)
-    trial = Attempts(problem, problem, RIG, {}, {}, BLOCKS)
+    attempts = Attempts(problem, problem, RIG, {}, {}, BLOCKS)
     pushed = hypothesis(
         {"external_torque": {}}, 0.2, events=Events(Term("external_torque"), {}, {})
     )
     wrong = replace(hypothesis({}, 0.2), wrong=("arm.payload",))
-    assert trial.fit_events(Term("payload_change"), pushed) is None
-    assert trial.fit_events(Term("payload_change"), wrong) is None
+    assert attempts.fit_events(Term("payload_change"), pushed) is None
+    assert attempts.fit_events(Term("payload_change"), wrong) is None
 
 
 def with_wrong(found: FittedHypothesis, *names: str) -> FittedHypothesis:
@@ -237,13 +241,13 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
         size = 1.0 if effect == "muscle_rate_damping" else 0.0
         return hypothesis({effect: {n: (size * v, s) for n, (v, s) in keys[effect].items()}}, 0.5)
 
-    trial = SimpleNamespace(
+    attempts = SimpleNamespace(
         settings=SETTINGS,
         fit_shortly=shortly,
         start_of=lambda fit, effect: Start(effect, {}, {}, (), False),
     )
     search = SimpleNamespace(
-        trial=trial, start=hypothesis({}, 1.0), weight=lambda candidate: candidate.misfit
+        attempts=attempts, start=hypothesis({}, 1.0), weight=lambda candidate: candidate.misfit
     )
     ranked = {
         term: [
@@ -271,14 +275,14 @@ def test_inside_the_error_of_the_model_effects_get_a_few_steps(
     ]
     screened = SimpleNamespace(strong=strong, scores=lambda: scores)
     search = SimpleNamespace(screened=screened, start=SimpleNamespace(fit=None))
-    state = SimpleNamespace(search=search, per_recording=[], transient=[], mistaken=["wrong"])
-    monkeypatch.setattr(_hypotheses, "_screen_mismatch", lambda refit, tell: state)
+    state = SimpleNamespace(search=search, per_recording=[], transient=[], wrong_values=["wrong"])
+    monkeypatch.setattr(_hypotheses, "screen_mismatch", lambda refit, tell: state)
     shortly = SimpleNamespace(fit_shortly=lambda starts, _: starts[0].effect.id)
     refit = SimpleNamespace(
         error=({}, {"arm": 1.0}),
-        error_is_given=False,
+        attempts=SimpleNamespace(nominal=RIG, settings=SETTINGS),
         start="start",
-        with_error_sizes=lambda sizes: SimpleNamespace(trial=shortly),
+        with_error_sizes=lambda sizes: SimpleNamespace(attempts=shortly),
         with_smaller_error=lambda candidates: candidates,
     )
-    assert _hypotheses._refit_with_smaller_model_error(refit, print) == ["start", *tried, "wrong"]
+    assert _hypotheses.refit_with_smaller_curve_error(refit, print) == ["start", *tried, "wrong"]

@@ -14,7 +14,7 @@ import pamrs
 from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, judge
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.fit import fit, residuals
-from pamrs.diagnosis.model._conclude import _merged, _settled
+from pamrs.diagnosis.model._conclude import _merged_rig, _with_common_zeros
 from pamrs.diagnosis.screen import tangent_of
 from pamrs.effects import UNDECIDED
 from pamrs.errors import DiagnosisError
@@ -108,16 +108,16 @@ def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> No
         for own, c in zip((chamber, arm), candidates, strict=True)
     ]
     judged = judge(groups, SETTINGS)
-    settled = _settled(RIG, chamber, judged, candidates)
+    settled = _with_common_zeros(RIG, chamber, judged, candidates)
     assert settled[1] is candidates[1]
-    model = _merged(RIG, settled)
+    model = _merged_rig(RIG, settled)
     assert model.parameter("sensors.pressure_zero").value == last.values["sensors.pressure_zero"]
 
     def missed(model: pamrs.Rig) -> float:
         found = residuals(chamber, model)["chamber", "all"]
         return float(np.sqrt(np.mean(found.value[found.rows] ** 2)))
 
-    assert missed(model) < missed(_merged(RIG, candidates))
+    assert missed(model) < missed(_merged_rig(RIG, candidates))
     assert missed(model) < 1.02 * missed(true)
 
 

@@ -326,7 +326,7 @@ def test_a_group_that_misses_much_is_not_one_of_which_nothing_is_missing() -> No
     assert (judged.verdict, models.verdict) == ("unlisted", "unlisted")
     assert (judged.group.mismatch, judged.group.suspects) == (own.blocks[0], own.blocks)
     # an error of the model of that size explains it
-    wide = {key: NoiseLevel(400.0, 4e4, stated=0.9999) for key in levels}
+    wide = {key: NoiseLevel(400.0, 4e4, curve_share=0.9999) for key in levels}
     models, *_ = _conclude._sound_models(RIG, problem, problem, [quiet], wide)
     assert models.verdict in ("none", "parameters")
 
@@ -342,4 +342,4 @@ def test_a_name_that_predicts_its_block_worse_than_the_rig_file_is_put_aside() -
     assert blamed(800.0, 898.0) == {0}
     assert blamed(800.0, 810.0) == set()  # no more than chance
     assert blamed(800.0, 790.0) == set()
-    assert _conclude._without_name(own, judged).probabilities == {UNLISTED: 1.0}
+    assert _conclude._without_addition(own, judged).probabilities == {UNLISTED: 1.0}

@@ -14,11 +14,12 @@ import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, weigh
+from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, weigh
 from pamrs.diagnosis.fit import Problem, acts_in, places_of, residuals, starts_of
 from pamrs.diagnosis.next_experiment import measurable
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.search import Attempts
 from pamrs.effects import CATALOGUE, Term, find_parameter
 from pamrs.findings import BlockVerdict, Part
 from pamrs.recordings import Recording
@@ -169,10 +170,10 @@ def weighed(*found: FittedHypothesis) -> dict[str, float]:
 def test_an_effect_at_many_places_is_no_more_probable_for_it() -> None:
     blocks = blocks_of(PAIR)
     problem = Problem(blocks, [], core_rig(PAIR), SETTINGS)
-    trial = Attempts(problem, problem, PAIR, {}, {}, blocks)
+    attempts = Attempts(problem, problem, PAIR, {}, {}, blocks)
     names = ["leak_muscle", "leak_muscle@flexor", "leak_muscle@extensor"]
-    assert trial.terms_of("leak_muscle") == list(terms(*names))
-    assert trial.terms_of("supply_leak") == [Term("supply_leak")]
+    assert attempts.terms_of("leak_muscle") == list(terms(*names))
+    assert attempts.terms_of("supply_leak") == [Term("supply_leak")]
     rival = made_up("valve_area", 3.0, 1)
     alone = weighed(made_up("leak_muscle", 3.0, 1), rival)
     shared = weighed(*(made_up(name, 3.0, len(names)) for name in names), rival)

@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pamrs
-from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.fit._fitting import Scaling
 from pamrs.diagnosis.fit._known_parameters import (
@@ -22,7 +21,7 @@ from pamrs.diagnosis.fit._known_parameters import (
     moved_slope,
     moved_value,
 )
-from pamrs.diagnosis.noise import noise_levels
+from pamrs.diagnosis.noise import inflation_of, noise_levels
 from pamrs.diagnosis.prepare import Prepared, predicted, residual, with_unjudged_starts
 from pamrs.rig import Parameter
 from pamrs.simulation import core_rig
@@ -97,8 +96,8 @@ def test_a_fit_that_follows_the_noise_of_a_drive_weighs_no_more(pair: Problem) -
     rig = pamrs.rigs.antagonistic_joint()
     found = fit(pair, rig, (), {}, {"arm.elbow": 1.0})
     levels = noise_levels(pair, core_rig(found.rig))
-    own = autocorrelation_of(pair, found, {})["arm.elbow"]
-    known = autocorrelation_of(pair, found, levels)["arm.elbow"]
+    own = inflation_of(pair, found, {})["arm.elbow"]
+    known = inflation_of(pair, found, levels)["arm.elbow"]
     assert known == pytest.approx(max(own, np.mean([v.inflation for v in levels.values()])))
     assert known > 1.5 * own > 15.0  # white noise of the angle alone would be 1
 

@@ -15,9 +15,9 @@ from pamrs.diagnosis.evidence import significant
 from pamrs.diagnosis.fit import Problem, residuals
 from pamrs.diagnosis.noise import (
     Excess,
+    curve_errors_of,
     error_sizes,
     excess,
-    model_error,
     noise_levels,
     with_sizes,
 )
@@ -115,12 +115,12 @@ def test_the_size_of_an_error_is_found(share: float, low: float, high: float) ->
 
 
 def test_what_the_file_states_takes_the_place_of_the_usual_error() -> None:
-    usual = model_error(RIG, 0.01)
+    usual = curve_errors_of(RIG, 0.01)
     assert usual["muscle"] == {"share": 0.01}
     assert usual["joint_angle"] == {"share": pytest.approx(0.001)}
-    assert model_error(RIG, 0.0) == {}
+    assert curve_errors_of(RIG, 0.0) == {}
     text = RIG.to_toml_text() + '\n[model_error]\nmuscle = "3 %"\n'
-    stated = model_error(parse_rig(text), 0.01)
+    stated = curve_errors_of(parse_rig(text), 0.01)
     assert stated["muscle"] == {"share": pytest.approx(0.03)}
     assert stated["valve"] == {"share": 0.01}
 

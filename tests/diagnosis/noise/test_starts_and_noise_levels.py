@@ -232,7 +232,7 @@ def test_what_relaxes_at_once_is_another_stiffness() -> None:
     """A time constant below its own standard deviation was not seen: the wrong value wins."""
     name, start = "muscle.modulus_scale", named("", 400.0)
     known = {"moved": {name: -10.0}, "scales": {name: 0.03}}
-    value = made_up(RIG, name, named("", 1.02).fitted, {name: 0.7}, **known)
+    value = made_up(RIG, name, named("", 1.02).fit_excess, {name: 0.7}, **known)
     creep = named("muscle_creep", 1.0, time_constant=2.0)
 
     def odds(std: float) -> dict[str, float]:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 import pamrs
 from pamrs.diagnosis import _problems
-from pamrs.diagnosis.evidence import autocorrelation_of, without_autocorrelation
 from pamrs.diagnosis.fit import Fit, Problem, residuals
+from pamrs.diagnosis.noise import inflation_of, no_inflation
 from pamrs.diagnosis.ready import readied
-from pamrs.diagnosis.search import refitted, with_autocorrelation
+from pamrs.diagnosis.search import refitted, with_inflation
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from tests.diagnosis.asked import SETTINGS
@@ -44,8 +44,8 @@ def problem_of(rig: Rig, recordings: list[Recording]) -> Problem:
 
 
 def at_the_end(problem: Problem, rig: Rig) -> Fit:
-    first = refitted(problem, rig, without_autocorrelation(problem.blocks))
-    return with_autocorrelation(problem, rig, first, {})[0]
+    first = refitted(problem, rig, no_inflation(problem.blocks))
+    return with_inflation(problem, rig, first, {})[0]
 
 
 def test_a_tank_without_a_gauge_goes_on_behind_a_hole() -> None:
@@ -170,9 +170,9 @@ def test_a_recording_that_fits_nothing_takes_no_weight_from_the_others() -> None
     for name, moved in MOVED.items():
         assert found.moved[name] == pytest.approx(moved, abs=0.05)
         assert found.std[name] < 0.1 * found.scales[name]
-    weights = autocorrelation_of(problem, found, {})
-    assert list(weights.apart) == [("force", "r3")]
-    assert weights.apart["force", "r3"] > 1e3 * weights["force"]
+    inflation = inflation_of(problem, found, {})
+    assert list(inflation.apart) == [("force", "r3")]
+    assert inflation.apart["force", "r3"] > 1e3 * inflation["force"]
     (told,) = problem.losses.told
     assert "block force: the refitted model misses r3 by" in told
 
@@ -225,7 +225,7 @@ def test_a_refit_that_went_no_further_says_so() -> None:
     tight = parse_rig(text)
     assert tight.model["load"]["min_length"] == pytest.approx(0.167)
     problem = problem_of(tight, [pulled(true_bench(), "fit", k) for k in range(3)])
-    found = refitted(problem, tight, without_autocorrelation(problem.blocks))
+    found = refitted(problem, tight, no_inflation(problem.blocks))
     assert abs(found.moved["muscle.rest_length"]) < 0.1
     (told,) = problem.losses.told
     assert "the refit of the baseline stopped" in told

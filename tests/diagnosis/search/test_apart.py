@@ -8,18 +8,12 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import (
-    Attempts,
-    BlockGroup,
-    FittedHypothesis,
-    Weighing,
-    judge,
-    weigh,
-)
+from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, Weighing, judge, weigh
 from pamrs.diagnosis.fit import Fit, Problem
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.diagnosis.search._hypotheses import _split_by_names
+from pamrs.diagnosis.search import Attempts
+from pamrs.diagnosis.search._examine import _split_by_names
 from pamrs.effects import UNLISTED, Hypothesis
 from pamrs.findings import case_verdict
 from pamrs.simulation import core_rig
@@ -58,7 +52,9 @@ def group(*found: FittedHypothesis) -> BlockGroup:
     every = [start, *found]
     probabilities = weigh(every, BLOCKS, WEIGHING)
     chamber = next(b for b in BLOCKS if b.name == "chamber")
-    return BlockGroup(BLOCKS, start.fitted, start.fitted, every, probabilities, chamber, {}, BLOCKS)
+    return BlockGroup(
+        BLOCKS, start.fit_excess, start.fit_excess, every, probabilities, chamber, {}, BLOCKS
+    )
 
 
 def leak(supply: float, chamber: float) -> FittedHypothesis:

@@ -13,7 +13,7 @@ from pamrs.diagnosis.explain import forms_of
 from pamrs.diagnosis.explain._forms import form_sentence
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, fits, residuals
 from pamrs.diagnosis.fit._fitting import FIT_BIN_TIME
-from pamrs.diagnosis.noise import NoiseLevel, excess, inflation, noise_levels
+from pamrs.diagnosis.noise import NoiseLevel, excess, noise_levels, usual_inflation
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.search import find_closure
 from pamrs.diagnosis.search._closure import _MOST_TERMS
@@ -65,11 +65,11 @@ class Case:
         self.blocks = self.problem.blocks
         white = dict.fromkeys(names, 1.0)
         first = fit(self.problem, NOMINAL, (), {}, white)
-        self.autocorrelation = {
-            b.name: inflation(b, self.problem.recordings, first.residuals, FIT_BIN_TIME)
+        self.inflation = {
+            b.name: usual_inflation(b, self.problem.recordings, first.residuals, FIT_BIN_TIME)
             for b in self.blocks
         }
-        self.baseline = fit(self.problem, NOMINAL, (), {}, self.autocorrelation, warm=first)
+        self.baseline = fit(self.problem, NOMINAL, (), {}, self.inflation, warm=first)
         self.evaluations = 0
 
     def found(self, monkeypatch: pytest.MonkeyPatch, blocks: list[Block]) -> Fit | None:
@@ -80,7 +80,7 @@ class Case:
         monkeypatch.setattr("pamrs.diagnosis.search._closure.residuals", counted)
         monkeypatch.setattr("pamrs.diagnosis.fit._fitting.residuals", counted)
         return find_closure(
-            self.problem, NOMINAL, self.baseline, self.autocorrelation, blocks, lambda _: None
+            self.problem, NOMINAL, self.baseline, self.inflation, blocks, lambda _: None
         )
 
     def gap_closed(self, model: Fit, block: str) -> float:
@@ -176,7 +176,7 @@ def test_a_null_keeps_no_excess_and_next_to_no_terms(
 def test_what_does_not_fit_together_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     case = Case(NOMINAL, ("arm",))
     with pytest.raises(DiagnosisError, match="blocks"):
-        find_closure(case.problem, NOMINAL, case.baseline, case.autocorrelation, [], lambda _: None)
+        find_closure(case.problem, NOMINAL, case.baseline, case.inflation, [], lambda _: None)
     with pytest.raises(DiagnosisError, match="closure_torque"):
         described(case.baseline, case.problem, case.baseline)
     prepared = case.problem.recordings[0]

@@ -13,15 +13,16 @@ from typing import cast
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts, FittedHypothesis, Weighing, significant
+from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, significant
 from pamrs.diagnosis.fit import fit, form_in, starts_of
 from pamrs.diagnosis.model import owners_of_effects
 from pamrs.diagnosis.screen import screen
+from pamrs.diagnosis.search import Attempts
 from pamrs.diagnosis.search._sets import _STRONG_RATIO, Search, far_above_noise, in_best_forms
 from pamrs.effects import Term
 from tests.diagnosis.again import case
 from tests.diagnosis.asked import SETTINGS, problem_of
-from tests.diagnosis.held import RIG, attempts
+from tests.diagnosis.held import RIG, attempts_at
 from tests.diagnosis.terms import terms
 
 SHOULDER = pamrs.rigs.shoulder()
@@ -29,40 +30,48 @@ LEAKY = RIG.with_effect("leak_muscle", {"conductance": 5e-12, "exponent": 1.6}, 
 
 
 @pytest.fixture(scope="module")
-def trial() -> Attempts:
+def attempts() -> Attempts:
     """A chamber with a leak in its second form, held from three pressures, the last one held
     out.
     """
-    return attempts(LEAKY, (8e5, 5e5, 3e5), 60.0)
+    return attempts_at(LEAKY, (8e5, 5e5, 3e5), 60.0)
 
 
-def hurried(trial: Attempts, evaluations: int) -> FittedHypothesis:
+def hurried(attempts: Attempts, evaluations: int) -> FittedHypothesis:
     """A leak in its first form and the heat of the wall, fitted in so many evaluations."""
     starts = [starts_of(effect, sealed=True)[0] for effect in terms("leak_muscle", "heat_transfer")]
     free = {name: value for start in starts for name, value in start.free.items()}
-    held = {name: value for start in starts for name, value in start.held.items()}
+    fixed = {name: value for start in starts for name, value in start.fixed.items()}
     effects = tuple(start.effect for start in starts)
-    found = fit(trial.inner, RIG, effects, free, trial.white, fixed=held, evaluations=evaluations)
-    return trial.judge(effects, found)
+    found = fit(
+        attempts.fit_problem,
+        RIG,
+        effects,
+        free,
+        attempts.no_inflation,
+        fixed=fixed,
+        evaluations=evaluations,
+    )
+    return attempts.assess(effects, found)
 
 
-def test_a_set_ends_weighted_by_what_it_leaves(trial: Attempts) -> None:
-    begun = hurried(trial, 1)
-    ended = trial.polish(begun)
-    first, last = trial.autocorrelation(begun.fit), trial.autocorrelation(ended.fit)
+def test_a_set_ends_weighted_by_what_it_leaves(attempts: Attempts) -> None:
+    begun = hurried(attempts, 1)
+    ended = attempts.polish(begun)
+    first, last = attempts.inflation_of(begun.fit), attempts.inflation_of(ended.fit)
     for block, left in last.items():
         assert first[block] > 10.0 * left  # it left far more where it began
         assert ended.fit.inflation[block] <= 2.0 * left
 
 
-def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(trial: Attempts) -> None:
-    base = hurried(trial, 20)
-    assert any(significant(kept) for kept in base.fitted.values())
-    start = fit(trial.inner, RIG, (), {}, trial.white)
+def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(attempts: Attempts) -> None:
+    base = hurried(attempts, 20)
+    assert any(significant(kept) for kept in base.fit_excess.values())
+    start = fit(attempts.fit_problem, RIG, (), {}, attempts.no_inflation)
     both = list(terms("leak_muscle", "heat_transfer"))
-    screened = screen(trial.inner, start, both, trial.white, sealed=True)
+    screened = screen(attempts.fit_problem, start, both, attempts.no_inflation, sealed=True)
     told: list[str] = []
-    search = Search(trial, screened, base, Weighing(0.985, 60.0, SETTINGS), told.append)
+    search = Search(attempts, screened, base, Weighing(0.985, 60.0, SETTINGS), told.append)
     found = in_best_forms(search, base)
     assert told[0] == "trying other forms of leak_muscle in leak_muscle+heat_transfer"
     assert form_in(found.fit.rig, Term("leak_muscle")) == "power"
@@ -70,18 +79,18 @@ def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(trial: Atte
     assert found.fit.values["leak_muscle.exponent"] == pytest.approx(1.6, abs=0.1)
 
 
-def test_what_is_far_above_the_noise_is_so_by_its_size_or_its_power(trial: Attempts) -> None:
-    base = hurried(trial, 20)
-    (block,) = trial.suspects
+def test_what_is_far_above_the_noise_is_so_by_its_size_or_its_power(attempts: Attempts) -> None:
+    base = hurried(attempts, 20)
+    (block,) = attempts.suspects
     strong = _STRONG_RATIO
 
     def left(ratio: float, systematic: float) -> FittedHypothesis:
-        kept = replace(base.fitted[block.name], ratio=ratio, systematic=systematic)
-        return replace(base, fitted={block.name: kept}, held_out={block.name: kept})
+        kept = replace(base.fit_excess[block.name], ratio=ratio, systematic=systematic)
+        return replace(base, fit_excess={block.name: kept}, held_out_excess={block.name: kept})
 
-    assert not far_above_noise(trial, left(0.9 * strong, 0.9 * math.sqrt(strong)))
-    assert far_above_noise(trial, left(1.1 * strong, 1.0))
-    assert far_above_noise(trial, left(1.0, 1.1 * math.sqrt(strong)))
+    assert not far_above_noise(attempts, left(0.9 * strong, 0.9 * math.sqrt(strong)))
+    assert far_above_noise(attempts, left(1.1 * strong, 1.0))
+    assert far_above_noise(attempts, left(1.0, 1.1 * math.sqrt(strong)))
 
 
 def group(std: dict[str, float], *effects: str) -> FittedHypothesis:

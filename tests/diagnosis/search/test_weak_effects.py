@@ -13,7 +13,7 @@ from pamrs.diagnosis.evidence import BlockLikelihood, FittedHypothesis, Weighing
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.fit import Events
 from pamrs.diagnosis.noise import Excess
-from pamrs.diagnosis.search import _hypotheses
+from pamrs.diagnosis.search import _baseline
 from pamrs.effects import Term
 from tests.diagnosis.asked import ROLES, SETTINGS, blocks_of
 from tests.diagnosis.likelihoods import BINS, TIMES, made_up, rows_of
@@ -179,7 +179,7 @@ def test_events_have_to_explain_fitted_and_held_out_recordings_alike() -> None:
     def left(fitted: float, held: float, happened: Events | None) -> FittedHypothesis:
         found = candidate("external_torque", fitted)
         ratio = {"chamber": Excess(1.0 + held, 0.0, 0.0, 1.0, 1.0, LIMIT)}
-        return replace(found, held_out=ratio, fit=replace(found.fit, events=happened))
+        return replace(found, held_out_excess=ratio, fit=replace(found.fit, events=happened))
 
     start = left(60.0, 20000.0, None)
 
@@ -205,8 +205,8 @@ def test_a_tube_is_named_in_all_blocks_that_it_acts_in() -> None:
 def test_a_parameter_that_only_held_out_recordings_show_is_a_parameter(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(_hypotheses, "_FITTED_HINT", 0.0)
-    monkeypatch.setattr(_hypotheses, "_HELD_OUT_RATIO", 1.3)
+    monkeypatch.setattr(_baseline, "_FITTED_HINT", 0.0)
+    monkeypatch.setattr(_baseline, "_HELD_OUT_RATIO", 1.3)
     said: list[str] = []
     known = RIG.parameter("arm.viscous")
     truth = RIG.with_parameters({"arm.viscous": known.value + 2.0 * known.tol})

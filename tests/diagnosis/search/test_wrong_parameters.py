@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts, FittedHypothesis
+from pamrs.diagnosis.evidence import FittedHypothesis
 from pamrs.diagnosis.fit import Problem, fit
+from pamrs.diagnosis.search import Attempts, suspected_values
 from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
-from pamrs.diagnosis.search import suspected_values
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, _needless
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
@@ -105,14 +105,14 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
 def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     true = RIG.with_parameters({"arm.payload": 0.7 * 9.07})
     problem = problem_of(RIG, [recorded(true, "fit", 1, seconds=12.0)], "arm")
-    white = {"arm": 1.0}
-    baseline = fit(problem, RIG, (), {}, white, evaluations=20)
+    no_inflation = {"arm": 1.0}
+    baseline = fit(problem, RIG, (), {}, no_inflation, evaluations=20)
     found = suspected_values(baseline, problem.blocks)
     assert ("arm.payload",) in found
     assert ("arm.payload", "arm.first_moment") in found
     assert all(abs(baseline.moved[name]) <= 3.0 + 1e-9 for name in baseline.moved)
     more = {"freed": ["arm.payload"], "warm": baseline, "evaluations": 30, "share": 1e-5}
-    loose = fit(problem, RIG, (), {}, white, **more)
+    loose = fit(problem, RIG, (), {}, no_inflation, **more)
     assert loose.freed == ("arm.payload",)
     assert loose.moved["arm.payload"] < -10.0
     assert loose.values["arm.payload"] == pytest.approx(0.7 * 9.07, rel=0.03)
@@ -169,8 +169,8 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
     asked: list[tuple[str, ...]] = []
 
     class Trial:
-        settings, nominal, white = SETTINGS, RIG, {}
-        inner = Problem([], [], core_rig(RIG), SETTINGS)
+        settings, nominal, no_inflation = SETTINGS, RIG, {}
+        fit_problem = Problem([], [], core_rig(RIG), SETTINGS)
 
         def fit_freed(self, names: tuple[str, ...], baseline: object, share: object) -> None:
             asked.append(names)
@@ -185,10 +185,10 @@ def test_a_parameter_beside_another_has_to_take_a_share_of_its_own() -> None:
     def left(misfit: float) -> FittedHypothesis:
         return cast("FittedHypothesis", SimpleNamespace(misfit=misfit))
 
-    trial = cast("Attempts", SimpleNamespace(settings=SETTINGS))
+    attempts = cast("Attempts", SimpleNamespace(settings=SETTINGS))
     share = FURTHER_SHARE
     short = {("a",): left(100.0), ("b",): left(300.0), ("a", "b"): left(101.0 * (1.0 - share))}
-    assert _needless(("a", "b"), short, trial)
-    assert not _needless(("a", "b"), short | {("a", "b"): left(99.0 * (1.0 - share))}, trial)
-    assert not _needless(("a",), short, trial)
-    assert not _needless(("b", "c"), short | {("b", "c"): left(100.0)}, trial)
+    assert _needless(("a", "b"), short, attempts)
+    assert not _needless(("a", "b"), short | {("a", "b"): left(99.0 * (1.0 - share))}, attempts)
+    assert not _needless(("a",), short, attempts)
+    assert not _needless(("b", "c"), short | {("b", "c"): left(100.0)}, attempts)

@@ -1,28 +1,24 @@
 """Hypotheses, what speaks for each, and the verdict of each group of blocks.
 
-Public: `FittedHypothesis`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_out`,
-`autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
-`BlockLikelihood` (how probable recordings are);
-`weigh`, `explains`, `is_absent`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
-`possible_gain`, `prior_loss`, `Weighing` (their weights); `drop_undetermined`, `with_stated_std`,
-`is_outside`, `put_aside` (names that do not hold); `Judged`, `judge`, `case_probabilities`,
-`case_ambiguity`, `is_unlikely`, `parameters_at_wall` (verdicts).
+Public: `FittedHypothesis`, `BlockGroup`, `significant`, `misses_only_held_out` (hypotheses and what
+they leave); `BlockLikelihood`, `Likelihood` (how probable recordings are);
+`weigh`, `explains`, `is_absent`, `log_weight`, `LEAST_TEMPERING`, `share_left`, `same_recordings`,
+`probability_cap`, `possible_gain`, `prior_loss`, `Weighing` (their weights); `price_of_wrong`,
+`weigh_only_noise` (those where the baseline leaves only noise); `drop_undetermined`,
+`with_stated_std`, `is_outside`, `put_aside` (names that do not hold); `Judged`, `judge`,
+`case_probabilities`, `case_ambiguity`, `is_unlikely`, `parameters_at_wall` (verdicts).
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.evidence._candidates import (
-    Attempts,
     BlockGroup,
     FittedHypothesis,
-    autocorrelation_of,
     misses_only_held_out,
-    parts_of,
     significant,
-    start_of,
-    without_autocorrelation,
 )
-from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
+from pamrs.diagnosis.evidence._likelihood import BlockLikelihood, Likelihood
+from pamrs.diagnosis.evidence._only_noise import price_of_wrong, weigh_only_noise
 from pamrs.diagnosis.evidence._undetermined import (
     drop_undetermined,
     is_outside,
@@ -42,6 +38,7 @@ from pamrs.diagnosis.evidence._verdicts import (
 )
 from pamrs.diagnosis.evidence._weighing import (
     FORM_SHARE_ALIKE,
+    LEAST_TEMPERING,
     Weighing,
     explains,
     is_absent,
@@ -58,14 +55,14 @@ __all__ = [
     "SHARED_ODDS",
     "WALL_TOLERANCES",
     "FORM_SHARE_ALIKE",
-    "Attempts",
+    "LEAST_TEMPERING",
     "BlockLikelihood",
     "FittedHypothesis",
     "BlockGroup",
     "Judged",
+    "Likelihood",
     "Weighing",
     "are_alike",
-    "autocorrelation_of",
     "case_ambiguity",
     "case_probabilities",
     "drop_undetermined",
@@ -76,17 +73,16 @@ __all__ = [
     "is_unlikely",
     "judge",
     "log_weight",
-    "parts_of",
     "put_aside",
     "probability_cap",
     "possible_gain",
+    "price_of_wrong",
     "prior_loss",
     "same_recordings",
     "share_left",
     "significant",
     "with_stated_std",
-    "start_of",
     "parameters_at_wall",
     "weigh",
-    "without_autocorrelation",
+    "weigh_only_noise",
 ]

@@ -1,4 +1,4 @@
-"""Likelihood of residuals: a Gaussian process of noise, stated and unstated error of the model."""
+"""Likelihood of residuals: a Gaussian process of noise, curve error and leftover error."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from pamrs.diagnosis.fit import Key
 from pamrs.diagnosis.noise import NoiseLevel, bins_of, means_in_noises
 from pamrs.diagnosis.prepare import Block, Prepared, Residual
 
-_ERROR_TIME = 1.0  # [s] correlation time of the error that nobody states (decision 14)
-# [noise levels] sizes of that error that are worked out; half a decade apart splines are smooth
+_ERROR_TIME = 1.0  # [s] correlation time of the leftover error (decision 14)
+# [noise levels of bin means] sizes of that error that are worked out (half a decade apart splines
+# are smooth), and those between that are tried
 _SIZES = 10.0 ** np.arange(-1.0, 7.1, 0.5)
-_BETWEEN = 10.0 ** np.linspace(-1.0, 7.0, 321)  # [noise levels] those between that are tried
-_CURVE_DEVIATIONS = 2.0  # [standard deviations] height of a curve of the model's error at the most
+_BETWEEN = 10.0 ** np.linspace(-1.0, 7.0, 321)
+_CURVE_DEVIATIONS = 2.0  # [standard deviations] height of a curve of the curve error at the most
 _LEAST_SQUARE = 1e-3  # square below which differences say nothing
 
 
@@ -29,12 +30,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BlockLikelihood:
-    """Log density of what a hypothesis leaves of one block, by size of the unstated model error.
+    """Log density of what a hypothesis leaves of one block, by size of the leftover error.
 
     Attributes
     ----------
     sizes : (k,) array
-        Sizes of the error that nobody states, in noise levels; the first is none.
+        Sizes of the leftover error, in noise levels of bin means; the first is none.
     by_size : (k,) array
         Logarithm of the density of the bin means for each.
     volume : (k,) array
@@ -42,9 +43,9 @@ class BlockLikelihood:
     count : int
         How many bins there are.
     power : float
-        Mean square of the bin means, in noise levels squared.
+        Mean square of the bin means, in their noise levels squared.
     error_power : float
-        The most of it that noise and the curves of the model's error are likely to have.
+        The most of it that noise and curve error are likely to have.
     """
 
     sizes: Array
@@ -61,8 +62,8 @@ class BlockLikelihood:
 
     @property
     def size(self) -> float:
-        """Size of the unstated error: the most probable one or, if larger, the root of the power
-        that noise and stated error do not explain; infinite where nothing is probable.
+        """Size of the leftover error: the most probable one or, if larger, the root of the power
+        that noise and curve error do not explain; infinite where nothing is probable.
         """
         best = int(self.by_size.argmax())
         if not math.isfinite(self.by_size[best]):
@@ -71,7 +72,7 @@ class BlockLikelihood:
         return max(float(self.sizes[best]), beyond)
 
     def expected(self, size: float) -> float:
-        """Log density that residuals with an unstated error of this size have on average."""
+        """Log density that residuals with a leftover error of this size have on average."""
         return -0.5 * (self.count + float(np.interp(size, self.sizes, self.volume)))
 
 
@@ -80,8 +81,8 @@ class Likelihood:
     """Likelihood of the residuals of some blocks and recordings.
 
     Bin means in units of their noise have the covariance ``1 + C C^T + r^2 K``: noise, the curves C
-    of the model's error (the same in all recordings), and an error of the size r that nobody
-    states, which forgets itself exponentially in time. Of r the most probable value counts.
+    of the curve error (the same in all recordings, stated or usual), and a leftover error of the
+    size r, which forgets itself exponentially in time. Of r the most probable value counts.
 
     Attributes
     ----------
@@ -131,7 +132,7 @@ class Likelihood:
 
 
 class _Covariance:
-    """The covariance of a block's bin means under each size of the error that nobody states."""
+    """The covariance of a block's bin means under each size of the leftover error."""
 
     def __init__(self, times: list[Array], curves: list[Array]) -> None:
         self._without = _CovarianceAtSize(0.0, times, curves)
@@ -163,7 +164,7 @@ class _Covariance:
 
 
 class _CovarianceAtSize:
-    """Covariance of a block's bin means for one size of the unstated error.
+    """Covariance of a block's bin means for one size of the leftover error.
 
     In time the error is an Ornstein-Uhlenbeck process, whose inverse covariance is tridiagonal, so
     that all takes a time proportional to the number of bins.

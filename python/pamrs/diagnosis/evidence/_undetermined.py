@@ -59,14 +59,14 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     """
     settings = problem.settings
     probabilities = dict(group.probabilities)
-    to = _without_name(group)
+    to = _nameless_answer(group)
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
         if len(candidate.terms) != 1 or chance < settings.in_set:
             continue
-        stated = with_stated_std(problem, group, candidate)
-        inside = may_be_inside(stated, settings.most_tolerances, _DETERMINED_STDS)
-        if inside or _has_undetermined_effect(stated):
+        with_std = with_stated_std(problem, group, candidate)
+        inside = may_be_inside(with_std, settings.most_tolerances, _DETERMINED_STDS)
+        if inside or _has_undetermined_effect(with_std):
             lost = 1.0 if candidate.wrong and to == UNDECIDED else 0.5
             probabilities[candidate.hypothesis] -= lost * chance
             probabilities[to] = probabilities.get(to, 0.0) + lost * chance
@@ -116,11 +116,11 @@ def put_aside(group: BlockGroup, hypothesis: Hypothesis) -> BlockGroup:
     if total > 0.0:
         probabilities = {h: p / total for h, p in probabilities.items()}
     else:
-        probabilities[_without_name(group)] = 1.0
+        probabilities[_nameless_answer(group)] = 1.0
     candidates = [c for c in group.candidates if c.hypothesis != hypothesis]
     return replace(group, candidates=candidates, probabilities=probabilities)
 
 
-def _without_name(group: BlockGroup) -> Hypothesis:
+def _nameless_answer(group: BlockGroup) -> Hypothesis:
     """Answer without a name: `UNDECIDED` where only noise is left, else `UNLISTED`."""
     return UNDECIDED if group.mismatch is None else UNLISTED

@@ -39,15 +39,16 @@ _ALIKE_SHARE = 0.5
 _LISTED = 1e-4
 _COUNTED = 1e-6  # probability from which a hypothesis of one group is put beside those of others
 _MOST_SETS = 8  # sets that a case lists
-# probability of parameters (none) in a group that keeps noise: the rest (decision 4)
+# `UNDECIDED` of a group of which only noise is left is divided by these numbers (decision 4):
+# most of it goes to parameters where these moved, else to none
 _QUIET_LIKELY = 0.83
-# probability of none where parameters moved, and the reverse (decision 4)
+# of none where parameters moved, of parameters where they did not
 _QUIET_OTHER = 0.03
-# probability of unlisted in such a group, too small to see: 24 of 171 groups (decision 4)
+# of unlisted: in 24 of 171 such groups physics was missing that was too small to be seen
 _QUIET_UNLISTED = 0.14
-# parameters with one at its wall: explained, at a price the owner would mind (decision 4)
+# of parameters where their values are unlikely: these explain all, at a price the owner would mind
 _STRAINED_PARAMETERS = 0.75
-_STRAINED_UNLISTED = 0.25  # probability of unlisted there (decision 4)
+_STRAINED_UNLISTED = 0.25  # of unlisted there
 # [tolerances] moved to its wall (fit.most_tolerances), which is suspect (decision 25)
 WALL_TOLERANCES = 2.9
 # [noise levels] left in a group below which nothing has no name: both such groups of 40 read cases
@@ -100,38 +101,36 @@ class Judged:
         return min(1.0, sum(p for h, p in self.probabilities.items() if term in h.terms))
 
 
-def parameters_at_wall(group: BlockGroup) -> dict[str, float]:
-    """Parameters that the refit without effects moved to their wall, and how far [tolerances]."""
-    return _at_wall(group.candidates[0].fit)
-
-
-def _at_wall(fit: Fit) -> dict[str, float]:
+def parameters_at_wall(fit: Fit) -> dict[str, float]:
+    """Parameters that a fit moved to their wall, and how far [tolerances]."""
     return {name: far for name, far in fit.moved.items() if abs(far) >= WALL_TOLERANCES}
 
 
 def _probabilities_alone(group: BlockGroup) -> dict[Hypothesis, float]:
     """Probabilities of one group alone, with that of `UNDECIDED` divided among other answers."""
     weights = {h: p for h, p in group.probabilities.items() if h != UNDECIDED}
-    unchanged = group.probabilities.get(UNDECIDED, 0.0)
+    undecided = group.probabilities.get(UNDECIDED, 0.0)
     if _leaves_little(group):
-        unchanged += weights.pop(UNLISTED, 0.0)
-    shifted = any(significant(e) for e in group.nominal.values())
-    explained = any(c.wrong and weights.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates)
+        undecided += weights.pop(UNLISTED, 0.0)
+    nominal_misses = any(significant(e) for e in group.nominal.values())
+    has_wrong_value = any(
+        c.wrong and weights.get(c.hypothesis, 0.0) > 0.0 for c in group.candidates
+    )
     quiet = {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
     unlikely = is_unlikely(group.candidates[0].fit)
-    if unlikely and group.mismatch is None and not explained:
+    if unlikely and group.mismatch is None and not has_wrong_value:
         quiet = {PARAMETERS: _STRAINED_PARAMETERS, UNLISTED: _STRAINED_UNLISTED}
-    elif not shifted:
+    elif not nominal_misses:
         quiet |= {NONE: _QUIET_LIKELY, PARAMETERS: _QUIET_OTHER}
     for hypothesis, share in quiet.items():
-        weights[hypothesis] = weights.get(hypothesis, 0.0) + unchanged * share
+        weights[hypothesis] = weights.get(hypothesis, 0.0) + undecided * share
     return {h: p for h, p in weights.items() if p >= _COUNTED or h in WITHOUT_NAME}
 
 
 def _leaves_little(group: BlockGroup) -> bool:
     """True where the refit leaves less of every block than ``unlisted`` needs."""
     start = group.candidates[0]
-    every = [*start.fitted.values(), *start.held_out.values()]
+    every = [*start.fit_excess.values(), *start.held_out_excess.values()]
     return bool(every) and max(e.systematic for e in every) < _LEAST_UNLISTED
 
 
@@ -139,7 +138,7 @@ def is_unlikely(fit: Fit) -> bool:
     """True where a value is at its wall, or values inside their tolerances and starts of gases lie
     further from what is known of them, together, than one in a hundred draws of them.
     """
-    if _at_wall(fit):
+    if parameters_at_wall(fit):
         return True
     moved = sum(abs(far) > 0.0 for far in fit.held_by_prior.values())
     starts = sum(residual.strain > 0.0 for residual in fit.residuals.values())
@@ -174,12 +173,14 @@ def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Jud
         for weights, (hypothesis, _) in zip(joint, choice, strict=True):
             weights[hypothesis] = weights.get(hypothesis, 0.0) + weight
     return [
-        _judged(group, _normalised(_capped(weights, settings.most_probability)), settings)
+        _with_verdict(
+            group, _normalised(_with_capped_names(weights, settings.most_probability)), settings
+        )
         for group, weights in zip(groups, joint, strict=True)
     ]
 
 
-def _capped(weights: dict[Hypothesis, float], most: float) -> dict[Hypothesis, float]:
+def _with_capped_names(weights: dict[Hypothesis, float], most: float) -> dict[Hypothesis, float]:
     """Cap the weights of all names together at a share of the total; `UNLISTED` gets the rest."""
     total = sum(weights.values())
     named = sum(w for h, w in weights.items() if h.terms)
@@ -246,10 +247,12 @@ def _normalised(weights: dict[Hypothesis, float]) -> dict[Hypothesis, float]:
     return dict(sorted(((h, w / total) for h, w in weights.items()), key=lambda item: -item[1]))
 
 
-def _judged(
+def _with_verdict(
     group: BlockGroup, probabilities: dict[Hypothesis, float], settings: DiagnosisSettings
 ) -> Judged:
-    """Judge a group by its likeliest hypothesis; unlisted only if no name exceeds ``named``."""
+    """A group with the verdict of its likeliest hypothesis; unlisted only if no name exceeds
+    ``named``.
+    """
     start = group.candidates[0]
     named = {h: p for h, p in probabilities.items() if h not in WITHOUT_NAME}
     healthy = max(_HEALTHY_HYPOTHESES, key=lambda h: probabilities.get(h, 0.0))

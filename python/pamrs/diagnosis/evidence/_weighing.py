@@ -24,13 +24,14 @@ from pamrs.effects import (
     usual_values,
 )
 
-# share of the logarithm of evidence that counts: at least, at most, and as a numerator over the
-# variance that is left, since what no model explains depends on itself (decision 14)
-_LEAST_SHARE, _MOST_SHARE, _NOISE_SHARE = 0.01, 0.1, 0.3
+# tempering, the share of the logarithm of evidence that counts: at least, at most, and as a
+# numerator over the variance that is left, since what no model explains depends on itself
+# (decision 14)
+LEAST_TEMPERING, _MOST_TEMPERING, _NOISE_TEMPERING = 0.01, 0.1, 0.3
 # share of what it explains that a right name leaves, as forms of equations err (decision 14)
 _FORM_ERROR = 0.1
 _FORM_SPREAD = math.log(3.0)  # spread of the logarithm of that share: a factor (decision 14)
-# [noise levels] error that is left beside whatever is explained: noise levels err (decision 14)
+# [noise levels of bin means] error beside whatever is explained: these levels err (decision 14)
 _LEAST_ERROR = 0.1
 _UNLISTED_PRICE = 6.0  # [log odds] price of physics without a name (decision 14)
 # odds of a name whose right fit was not found, or has no equation here, to physics without a name:
@@ -66,7 +67,7 @@ class Weighing:
     Attributes
     ----------
     most : float
-        Largest probability of a name.
+        Largest probability of all names together.
     seconds : float
         Length of the longest recording that was fitted [s].
     settings : DiagnosisSettings
@@ -121,10 +122,10 @@ def weigh(
     start = candidates[0]
     walls = weighing.settings.most_tolerances
     named = [c for c in candidates if c.terms and not is_absent(c, walls)]
-    share = _counted([start, *named], suspects)
-    scores = {c.hypothesis: log_weight(c, start, suspects, weighing, share) for c in named}
-    scores[UNDECIDED] = log_weight(start, start, suspects, weighing, share)
-    scores[UNLISTED] = _log_weight_unlisted(start, suspects, share)
+    tempering = _tempering([start, *named], suspects)
+    scores = {c.hypothesis: log_weight(c, start, suspects, weighing, tempering) for c in named}
+    scores[UNDECIDED] = log_weight(start, start, suspects, weighing, tempering)
+    scores[UNLISTED] = _log_weight_unlisted(start, suspects, tempering)
     top = max(scores.values())
     weights = {h: math.exp(max(-60.0, score - top)) for h, score in scores.items()}
     rare = {c.hypothesis: _rarity(c, weighing) for c in named}
@@ -157,14 +158,14 @@ def _share_taken(
     return min(1.0, max(0.0, 1.0 - after / before)) if before > 0.0 else 0.0
 
 
-def _counted(candidates: list[FittedHypothesis], suspects: list[Block]) -> float:
+def _tempering(candidates: list[FittedHypothesis], suspects: list[Block]) -> float:
     """Share of the log evidence that counts (a power posterior): larger, the nearer the best
     hypothesis is to noise. Noise is independent from bin to bin; what no hypothesis explains is
     not.
     """
     powers = [[c.likelihood()[block.name].power for block in suspects] for c in candidates]
     least_power = min(max(powers_of, default=1.0) for powers_of in powers)
-    return min(_MOST_SHARE, max(_LEAST_SHARE, _NOISE_SHARE / max(least_power, 1e-9)))
+    return min(_MOST_TEMPERING, max(LEAST_TEMPERING, _NOISE_TEMPERING / max(least_power, 1e-9)))
 
 
 def log_weight(
@@ -172,12 +173,12 @@ def log_weight(
     baseline: FittedHypothesis,
     suspects: list[Block],
     weighing: Weighing,
-    share: float = _LEAST_SHARE,
+    tempering: float,
 ) -> float:
-    """Logarithm of a hypothesis's weight, up to a constant: a share of its evidence in some blocks,
-    less its price, its moved parameters and its rare values.
+    """Logarithm of a hypothesis's weight, up to a constant: the share `tempering` of its evidence
+    in some blocks, less its price, its moved parameters and its rare values.
     """
-    evidence = _evidence(candidate, baseline, suspects, share) - _strain(candidate)
+    evidence = _evidence(candidate, baseline, suspects, tempering) - _strain(candidate)
     return evidence - prior_loss(candidate, weighing)
 
 
@@ -199,9 +200,9 @@ def _strain(candidate: FittedHypothesis) -> float:
 
 
 def _evidence(
-    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block], share: float
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block], tempering: float
 ) -> float:
-    """Share of a hypothesis's log evidence in some blocks, at the best size of the unstated error;
+    """Tempered log evidence of a hypothesis in some blocks, at the best size of the leftover error;
     an error above a tenth of what the hypothesis explains costs more, the larger it is.
     """
     total = 0.0
@@ -211,24 +212,28 @@ def _evidence(
         expected = _LEAST_ERROR + _FORM_ERROR * math.sqrt(taken)
         beyond = np.log(np.maximum(now.sizes, expected) / expected) / _FORM_SPREAD
         # windows that are too short for a hypothesis leave it fewer bins
-        tempered = share * before.count / max(1, now.count) * now.by_size
+        tempered = tempering * before.count / max(1, now.count) * now.by_size
         total += float((tempered - 0.5 * beyond**2).max())
     return total
 
 
-def _log_weight_unlisted(baseline: FittedHypothesis, suspects: list[Block], share: float) -> float:
+def _log_weight_unlisted(
+    baseline: FittedHypothesis, suspects: list[Block], tempering: float
+) -> float:
     """Log weight of physics without a name, as if a right name explained all."""
     total = 0.0
     for likelihood in (baseline.likelihood()[block.name] for block in suspects):
         error = _LEAST_ERROR + _FORM_ERROR * likelihood.size
         total += max(likelihood.most, likelihood.expected(error))
-    return share * total - _UNLISTED_PRICE - _strain(baseline)
+    return tempering * total - _UNLISTED_PRICE - _strain(baseline)
 
 
 def possible_gain(candidate: FittedHypothesis, suspects: list[Block]) -> float:
-    """Largest rise of a candidate's log weight by an addition that leaves nothing but noise."""
+    """Largest rise of a candidate's log weight in a search (of the least tempering) by an addition
+    that leaves nothing but noise.
+    """
     likelihoods = [candidate.likelihood()[block.name] for block in suspects]
-    return _LEAST_SHARE * sum(
+    return LEAST_TEMPERING * sum(
         max(0.0, likelihood.expected(0.0) - likelihood.most) for likelihood in likelihoods
     )
 
@@ -259,12 +264,12 @@ def _excesses(
 ) -> list[tuple[float, float]]:
     """Excess variance that the baseline and a set leave, on fitted and on held-out recordings."""
 
-    def over(found: dict[str, Excess]) -> float:
-        return sum(max(0.0, found[b.name].ratio - 1.0) for b in suspects)
+    def over(excess_by_block: dict[str, Excess]) -> float:
+        return sum(max(0.0, excess_by_block[b.name].ratio - 1.0) for b in suspects)
 
     return [
-        (over(baseline.fitted), over(candidate.fitted)),
-        (over(baseline.held_out), over(candidate.held_out)),
+        (over(baseline.fit_excess), over(candidate.fit_excess)),
+        (over(baseline.held_out_excess), over(candidate.held_out_excess)),
     ]
 
 
@@ -273,7 +278,9 @@ def explains(
 ) -> bool:
     """True where a candidate leaves only noise, fitted and held out, of what was clearly more."""
     quiet = not any(
-        significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out)
+        significant(e[b.name])
+        for b in suspects
+        for e in (candidate.fit_excess, candidate.held_out_excess)
     )
     before, after = max(_excesses(candidate, baseline, suspects))
     return quiet and after < _EXPLAINED_SHARE * before
@@ -421,7 +428,7 @@ def price(candidate: FittedHypothesis, settings: DiagnosisSettings) -> float:
 def _own_price(candidate: FittedHypothesis, term: Term, settings: DiagnosisSettings) -> float:
     """Log odds paid for an effect's parameters, or for how far a value of the file is wrong."""
     if term.id in candidate.wrong:
-        return settings.wrong_price + candidate.outside_of(term.id, settings.most_tolerances)
+        return settings.wrong_price + candidate.beyond_walls_by(term.id, settings.most_tolerances)
     parameters = (n for n in candidate.fit.effect_values if effect_of(n) == term)
     return settings.parameter_price * sum(not find_parameter(n).repeats for n in parameters)
 

@@ -71,8 +71,8 @@ _DETERMINED_MOVE = 2.0
 
 def assemble(
     case: Case,
-    fitted: Problem,
-    held: Problem,
+    fit_problem: Problem,
+    held_out_problem: Problem,
     groups: list[BlockGroup],
     conclusion: Conclusion,
     unjudged: Sequence[Unjudged] = (),
@@ -83,7 +83,7 @@ def assemble(
     ----------
     case : Case
         The case.
-    fitted, held : Problem
+    fit_problem, held_out_problem : Problem
         Recordings to fit and held-out ones (the same object when there are no others).
     groups : list of BlockGroup
         Gas blocks and arm, examined.
@@ -93,26 +93,32 @@ def assemble(
         Blocks of the rig that are not judged.
     """
     nominal, models, judged = case.rig, conclusion.models, conclusion.judged
-    verdict, noise_level, part = models.verdict, conclusion.noise_level, fitted.losses.part
+    verdict, noise_level, part = models.verdict, conclusion.noise_level, fit_problem.losses.part
     named = any(j.named or j.wrong for j in judged)
     known = models.chosen if named else models.starts
     owners = models.owners if named else owners_of_parameters(known)
     changed = models.added or any(j.wrong for j in judged)
-    inside, outside, errors = conclusion.inside, conclusion.outside, conclusion.errors
-    gap = _gap(conclusion.table, _LEAST_GAP) if changed else None
+    fit_residuals, errors = conclusion.fit_residuals, conclusion.errors
+    held_out_residuals, table = conclusion.held_out_residuals, conclusion.table
     blocks = block_entries(
-        judged, fitted, inside, held, outside, noise_level, conclusion.own_errors
+        judged,
+        fit_problem,
+        fit_residuals,
+        held_out_problem,
+        held_out_residuals,
+        noise_level,
+        conclusion.own_errors,
     )
-    forms = _forms(models, fitted)
-    stages = [(fitted, inside)]
-    if held is not fitted:
-        stages.insert(0, (held, outside))
-    effects = _effects(judged, verdict, fitted)
+    forms = _forms(models, fit_problem)
+    stages = [(fit_problem, fit_residuals)]
+    if held_out_problem is not fit_problem:
+        stages.insert(0, (held_out_problem, held_out_residuals))
+    effects = _effects(judged, verdict, fit_problem)
     constants = notes_on_constants(conclusion.runs or [], [effect.id for effect in effects])
     start_notes = notes_on_warm_starts(
-        fitted.blocks,
-        [*fitted.recordings, *held.recordings],
-        {**inside["after"], **outside["after"]},
+        fit_problem.blocks,
+        [*fit_problem.recordings, *held_out_problem.recordings],
+        {**fit_residuals["after"], **held_out_residuals["after"]},
     )
     diagnosis = Diagnosis(
         case=case.name,
@@ -121,38 +127,40 @@ def assemble(
         ambiguity=[hypothesis.words for hypothesis in conclusion.ambiguity],
         probabilities={str(h): p for h, p in conclusion.probabilities.items()},
         parameters=_parameters(nominal, known, owners),
-        fit=FitErrors(errors["fit"], errors["held_out"], gap),
+        fit=FitErrors(
+            errors["fit"], errors["held_out"], _gap(table, _LEAST_GAP) if changed else None
+        ),
         warnings=constants,
         rig=models.final
         if verdict == "none"
         else with_std(models.final, nominal, models.chosen, models.owners),
-        traces=_traces(fitted, held, inside, outside),
+        traces=_traces(fit_problem, held_out_problem, fit_residuals, held_out_residuals),
         blocks=[*blocks, *map(not_judged, unjudged)],
         budget=conclusion.budget,
         unexplained=unexplained(
             judged, blocks, stages, noise_level, conclusion.budget, forms, nominal, errors
         ),
-        wrong_parameters=_wrong_parameters(models, fitted, conclusion.table),
+        wrong_parameters=_wrong_parameters(models, fit_problem, table),
         measured=list(case.channels),
         residuals=_block_table(groups),
         tried=_tried_sets(groups),
-        considered=part("what was asked for", lambda: _considered(judged, fitted), []),
+        considered=part("what was asked for", lambda: _considered(judged, fit_problem), []),
         tested=part("the list of what was tested", lambda: _tested(groups), []),
         free_run=conclusion.runs,
         free_run_note=conclusion.runs_note,
         free_traces=conclusion.curves,
-        settings=fitted.settings,
+        settings=fit_problem.settings,
     )
     notes = [
         *words.absolute(case),
         *words.left_out(case, judged),
         *(words.reservations(models.chosen) if any(j.named or j.wrong for j in judged) else []),
-        *(words.worse(conclusion.table) if models.added else []),
-        *words.warnings(case, judged, diagnosis.parameters, held is fitted),
+        *(words.worse(table) if models.added else []),
+        *words.warnings(case, judged, diagnosis.parameters, held_out_problem is fit_problem),
     ]
     diagnosis = replace(diagnosis, warnings=[*constants, *notes, *start_notes])
-    picture = _picture(diagnosis.answer.block, conclusion, fitted)
-    where = words.where(diagnosis.answer, fitted, judged, picture, errors)
+    picture = _picture(diagnosis.answer.block, conclusion, fit_problem)
+    where = words.where(diagnosis.answer, fit_problem, judged, picture, errors)
     return _with_text(replace(answered(diagnosis), where=where), case, judged, forms)
 
 
@@ -172,7 +180,7 @@ def _picture(located: str | None, conclusion: Conclusion, fitted: Problem) -> Pi
     if located is None:
         return Picture()
     block = next(b for b in fitted.blocks if b.name == located)
-    nominal, residuals = conclusion.models.nominal, conclusion.inside["refit"]
+    nominal, residuals = conclusion.models.nominal, conclusion.fit_residuals["refit"]
     return fitted.losses.part(
         "the conditions of the mismatch",
         lambda: describe(block, fitted.recordings, nominal, residuals, conclusion.noise_level),
@@ -212,8 +220,8 @@ def _tried_sets(groups: list[BlockGroup]) -> list[Tried]:
             blocks=[b.name for b in group.blocks],
             effects=list(map(str, candidate.effects)),
             wrong_parameters=list(candidate.wrong),
-            fitted={b: e.ratio for b, e in candidate.fitted.items()},
-            held_out={b: e.ratio for b, e in candidate.held_out.items()},
+            fitted={b: e.ratio for b, e in candidate.fit_excess.items()},
+            held_out={b: e.ratio for b, e in candidate.held_out_excess.items()},
             gap_closed=candidate.gap_closed,
             scatter=candidate.scattered(),
             fitted_values=candidate.fit.effect_values,
@@ -487,10 +495,17 @@ def _block_table(groups: list[BlockGroup]) -> dict[str, BlockResidual]:
 
 
 def _traces(
-    fitted: Problem, held: Problem, inner: dict[str, Any], outer: dict[str, Any]
+    fit_problem: Problem,
+    held_out_problem: Problem,
+    fit_residuals: dict[str, Any],
+    held_out_residuals: dict[str, Any],
 ) -> list[Trace]:
     traces = []
-    stock = [(fitted, inner)] if held is fitted else [(fitted, inner), (held, outer)]
+    stock = (
+        [(fit_problem, fit_residuals)]
+        if held_out_problem is fit_problem
+        else [(fit_problem, fit_residuals), (held_out_problem, held_out_residuals)]
+    )
     for problem, residuals_by_stage in stock:
         for prepared in problem.recordings:
             for block in problem.blocks:

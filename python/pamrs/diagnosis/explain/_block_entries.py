@@ -29,10 +29,10 @@ from pamrs.rig import Rig
 
 def block_entries(
     judged: list[Judged],
-    fitted: Problem,
-    fit_found: Stages,
-    held: Problem,
-    out_found: Stages,
+    fit_problem: Problem,
+    fit_residuals: Stages,
+    held_out_problem: Problem,
+    held_out_residuals: Stages,
     noise_level: dict[Key, NoiseLevel],
     own_errors: Mapping[str, float],
 ) -> list[BlockVerdict]:
@@ -42,9 +42,9 @@ def block_entries(
     ----------
     judged : list of Judged
         The groups with their verdicts.
-    fitted, held : Problem
+    fit_problem, held_out_problem : Problem
         Recordings that were fitted and held out (the same object when there are no others).
-    fit_found, out_found : dict of str to dict
+    fit_residuals, held_out_residuals : dict of str to dict
         Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
     noise_level : dict
         Noise by block and recording.
@@ -53,10 +53,14 @@ def block_entries(
     """
 
     def mismatch(block: Block) -> BlockMismatch:
-        outside = None if held is fitted else _sizes(block, held, out_found, noise_level)
-        inside = _sizes(block, fitted, fit_found, noise_level)
+        held_out = (
+            None
+            if held_out_problem is fit_problem
+            else _sizes(block, held_out_problem, held_out_residuals, noise_level)
+        )
+        fitted = _sizes(block, fit_problem, fit_residuals, noise_level)
         unit, error = unit_of(block.channel), own_errors[block.channel]
-        return BlockMismatch(block.name, block.channel, unit, inside, outside, error)
+        return BlockMismatch(block.name, block.channel, unit, fitted, held_out, error)
 
     return [
         BlockVerdict(
@@ -78,7 +82,7 @@ def _located(judged: Judged) -> str | None:
     group = judged.group
     if group.mismatch is not None:
         return group.mismatch.name
-    moved = parameters_at_wall(group)
+    moved = parameters_at_wall(group.candidates[0].fit)
     worst = judged.wrong or tuple(sorted(moved, key=lambda name: -abs(moved[name])))
     told = [b.name for b in group.blocks if worst and depends(b, worst[0])]
     named = [b.name for b in group.blocks if any(concerns(term, b) for term in judged.named)]

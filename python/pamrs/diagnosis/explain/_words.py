@@ -140,7 +140,12 @@ def warnings(
     out = []
     groups = [j.group for j in judged]
     mistaken = any(j.wrong for j in judged)
-    symptoms = {n: v for j in judged if not j.wrong for n, v in parameters_at_wall(j.group).items()}
+    symptoms = {
+        name: far
+        for j in judged
+        if not j.wrong
+        for name, far in parameters_at_wall(j.group.candidates[0].fit).items()
+    }
     for recording in case.recordings:
         for channel, values in recording.channels.items():
             if (

@@ -1,9 +1,10 @@
 """Models fitted to all blocks and recordings together: parameters inside their tolerances, effects
 from several starts.
 
-Public: `Problem`, `Fit`, `Scaling`, `Weights`,
+Public: `Problem`, `Fit`, `Scaling`, `Inflation`,
 `Unfollowed`, `fit`, `residuals`, `changes`, `stacked`,
-`with_priors`, `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`, `Residuals`, `Stages`;
+`with_priors`, `predicted_with_doubt`, `predicted_by_others` (one recording left out after the
+other), `free_baseline`, `bin_width`, `Key`, `Residuals`, `Stages`;
 `levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where the fit of an effect begins);
 `form_in`, `entry_of`, `with_effects_of`, `with_entry`, `without_term` (effects of a rig
 and their forms);
@@ -29,13 +30,13 @@ from pamrs.diagnosis.fit._fitting import (
     LEAST_START,
     Events,
     Fit,
+    Inflation,
     Key,
     Problem,
     Residuals,
     Scaling,
     Stages,
     Unfollowed,
-    Weights,
     bin_width,
     changes,
     fit,
@@ -55,6 +56,7 @@ from pamrs.diagnosis.fit._known_parameters import (
     without_passing,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.fit._leave_one_out import predicted_by_others
 from pamrs.diagnosis.fit._offsets import with_offsets
 from pamrs.diagnosis.fit._spread import PIECE_TIME, spread_over_pieces
 from pamrs.diagnosis.fit._starts import (
@@ -84,7 +86,7 @@ __all__ = [
     "Scaling",
     "Start",
     "Unfollowed",
-    "Weights",
+    "Inflation",
     "acts_in",
     "bin_width",
     "changes",
@@ -104,6 +106,7 @@ __all__ = [
     "look_for_events",
     "moved_value",
     "places_of",
+    "predicted_by_others",
     "predicted_with_doubt",
     "residuals",
     "same_data_in",

@@ -74,7 +74,7 @@ def _logarithmic(name: str) -> bool:
     return effect is not None and effect.id + name.removeprefix(str(effect)) in LOGARITHMIC
 
 
-class Weights(dict[str, float]):
+class Inflation(dict[str, float]):
     """Variance of each block's binned residual relative to white sample noise, by which it counts
     less.
 
@@ -482,7 +482,7 @@ def stacked(
         Derivative of the rows with respect to each parameter, SI; None without parameters.
     """
     rows, slopes = [], []
-    apart = inflation.apart if isinstance(inflation, Weights) else {}
+    apart = inflation.apart if isinstance(inflation, Inflation) else {}
     for prepared in problem.recordings:
         for block in problem.blocks:
             key = block.name, prepared.recording.name
@@ -626,9 +626,9 @@ def fit(
         Dotted effect parameters that are free, with their starts.
     inflation : dict of str to float
         Variance of each block's binned residual relative to white sample noise (autocorrelated
-        residuals count less); of single recordings where it is :class:`Weights`.
+        residuals count less); of single recordings where it is :class:`Inflation`.
     fixed : dict of str to float, optional
-        Effect parameters that are held.
+        Effect parameters that stay fixed.
     warm : Fit, optional
         A fit of the same problem from whose baseline values to start.
     events : Events, optional

@@ -1,4 +1,4 @@
-"""Starts of the fit of an effect: sizes that scale, shapes to be tried, choices that are held."""
+"""Starts of the fit of an effect: sizes that scale, shapes to be tried, choices that are fixed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Start:
     ----------
     effect : Term
         Its id, with a place where it acts at one block of several.
-    free, held : dict of str to float
+    free, fixed : dict of str to float
         Dotted parameters that a fit moves, and those that it leaves, SI.
     sizes : tuple of str
         Those of ``free`` that scale the effect.
@@ -37,7 +37,7 @@ class Start:
 
     effect: Term
     free: dict[str, float]
-    held: dict[str, float]
+    fixed: dict[str, float]
     sizes: tuple[str, ...]
     signed: bool
     form: str = ""
@@ -49,12 +49,12 @@ class Start:
 
     @property
     def kind(self) -> tuple[str, frozenset[tuple[str, float]]]:
-        """Form of the start, and its held parameters."""
-        return self.form, frozenset(self.held.items())
+        """Form of the start, and its fixed parameters."""
+        return self.form, frozenset(self.fixed.items())
 
     def applied(self, rig: Rig) -> Rig:
         """The rig with the effect as it starts."""
-        values = self.effect.own(self.free | self.held)
+        values = self.effect.own(self.free | self.fixed)
         return rig.with_effect(self.effect.id, values, at=self.effect.at, form=self.form)
 
     def moved(self, effect: Term) -> Start:
@@ -67,7 +67,7 @@ class Start:
             self,
             effect=effect,
             free={named(name): value for name, value in self.free.items()},
-            held={named(name): value for name, value in self.held.items()},
+            fixed={named(name): value for name, value in self.fixed.items()},
             sizes=tuple(map(named, self.sizes)),
         )
 
@@ -149,7 +149,7 @@ def _starts_of_form(effect: Term, form: Form, *, sealed: bool) -> list[Start]:
     """Every start of one form."""
     shapes: list[list[tuple[str, float]]] = []
     sizes: dict[str, float] = {}
-    held: list[list[tuple[str, float]]] = []
+    fixed: list[list[tuple[str, float]]] = []
     signed = False
     form_name = "" if form is effect.info.forms[0] else form.name
     for parameter in form.parameters:
@@ -164,9 +164,9 @@ def _starts_of_form(effect: Term, form: Form, *, sealed: bool) -> list[Start]:
             shapes.append([(name, value) for value in parameter.starts])
         else:
             ends = (parameter.lower, parameter.upper) if role in CHOSEN else (parameter.default,)
-            held.append([(name, value) for value in ends])
+            fixed.append([(name, value) for value in ends])
     return [
-        Start(effect, sizes | dict(shape), dict(fixed), tuple(sizes), signed, form_name)
+        Start(effect, sizes | dict(shape), dict(chosen), tuple(sizes), signed, form_name)
         for shape in itertools.product(*shapes)
-        for fixed in itertools.product(*held)
+        for chosen in itertools.product(*fixed)
     ]

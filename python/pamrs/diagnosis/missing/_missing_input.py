@@ -85,7 +85,7 @@ def missing_input_of(
     for role, each in recordings.items():
         for prepared in each:
             name = prepared.recording.name
-            noise = noise_level[block.name, name].noise
+            noise = noise_level[block.name, name].binned_noise
             followed = _reconstructed(block, core, prepared, noise)
             if followed is None:
                 continue

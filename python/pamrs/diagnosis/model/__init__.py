@@ -6,11 +6,7 @@ Public: `conclude`, `Conclusion`, `Models`, `with_std`, `spoiled_channels`, `own
 one), `notes_on_constants` (free runs).
 """
 
-from pamrs.diagnosis.model._budget import (
-    DETERMINED_SHARE,
-    owners_of_effects,
-    owners_of_parameters,
-)
+from pamrs.diagnosis.model._budget import DETERMINED_SHARE, owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.model._conclude import Conclusion, Models, conclude, spoiled_channels, with_std
 from pamrs.diagnosis.model._free_run import notes_on_constants
 

@@ -222,7 +222,7 @@ def _without_held(
 def _in_order(judged: Judged) -> tuple[tuple[Term, ...], ...]:
     """Terms that a group names in steps: all wrong parameters, then effects, best alone first."""
     alone = {
-        c.effects[0]: sum(e.ratio for e in c.held_out.values())
+        c.effects[0]: sum(e.ratio for e in c.held_out_excess.values())
         for c in judged.group.candidates
         if len(c.effects) == 1
     }

@@ -17,15 +17,12 @@ from pamrs.diagnosis.evidence import (
     BlockGroup,
     FittedHypothesis,
     Judged,
-    autocorrelation_of,
     case_ambiguity,
     case_probabilities,
     drop_undetermined,
     is_outside,
     judge,
-    parts_of,
     put_aside,
-    start_of,
     with_stated_std,
 )
 from pamrs.diagnosis.fit import (
@@ -45,8 +42,9 @@ from pamrs.diagnosis.fit import (
 )
 from pamrs.diagnosis.model._budget import budget, owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.model._free_run import KnownValues, free_run
-from pamrs.diagnosis.noise import NoiseLevel
+from pamrs.diagnosis.noise import NoiseLevel, inflation_of
 from pamrs.diagnosis.prepare import Block, Residual
+from pamrs.diagnosis.search import parts_of, start_of
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, NONE, PARAMETERS, UNDECIDED, UNLISTED, Hypothesis, Term
 from pamrs.errors import SimulationError
@@ -130,7 +128,7 @@ class Conclusion:
         Those that are left open.
     noise_level : dict
         By block and recording.
-    inside, outside : dict of str to dict
+    fit_residuals, held_out_residuals : dict of str to dict
         Residuals of the recordings to fit and of the held-out ones (the same where there are no
         others) by stage (``before``, ``refit``, ``after``), block and recording.
     errors : dict of str to dict
@@ -153,8 +151,8 @@ class Conclusion:
     probabilities: dict[Hypothesis, float]
     ambiguity: list[Hypothesis]
     noise_level: dict[Key, NoiseLevel]
-    inside: dict[str, dict[Key, Residual]]
-    outside: dict[str, dict[Key, Residual]]
+    fit_residuals: dict[str, dict[Key, Residual]]
+    held_out_residuals: dict[str, dict[Key, Residual]]
     errors: dict[str, dict[str, ChannelError]]
     budget: list[BudgetTerm]
     runs: list[FreeRun] | None
@@ -177,27 +175,35 @@ class Conclusion:
         return _models_of(self.judged, self.probabilities, self.models.nominal, problem)
 
 
-def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGroup]) -> Conclusion:
+def conclude(
+    nominal: Rig, fit_problem: Problem, held_out_problem: Problem, groups: list[BlockGroup]
+) -> Conclusion:
     """Merge what the groups of blocks found into one model, and compute what it leaves.
 
     Parameters
     ----------
     nominal : Rig
         The model of the rig file.
-    fitted, held : Problem
+    fit_problem, held_out_problem : Problem
         Recordings to fit and held-out ones (the same object when there are no others).
     groups : list of BlockGroup
         Gas blocks and arm, examined.
     """
     noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
-    models, inside, outside = _sound_models(nominal, fitted, held, groups, noise_level)
-    judged, part = models.judged, fitted.losses.part
-    fit_table = _table(fitted, inside, noise_level)
-    held_table = _table(held, outside, noise_level) if held is not fitted else {}
-    budgeted = partial(budget, judged, held, outside, noise_level, nominal)
+    models, fit_residuals, held_out_residuals = _sound_models(
+        nominal, fit_problem, held_out_problem, groups, noise_level
+    )
+    judged, part = models.judged, fit_problem.losses.part
+    fit_table = _table(fit_problem, fit_residuals, noise_level)
+    held_out_table = (
+        {}
+        if held_out_problem is fit_problem
+        else _table(held_out_problem, held_out_residuals, noise_level)
+    )
+    budgeted = partial(budget, judged, held_out_problem, held_out_residuals, noise_level, nominal)
     known = _known(models)
     ending = models.final, models.events, known, noise_level
-    running = partial(free_run, held, outside, nominal, *ending)
+    running = partial(free_run, held_out_problem, held_out_residuals, nominal, *ending)
     nothing: tuple[list[FreeRun] | None, str, list[Trace]] = (None, "the free run failed", [])
     terms = part("the budget", lambda: budgeted(models.final, models.events), [])
     runs, note, curves = part("the free run", running, nothing)
@@ -206,32 +212,30 @@ def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGro
         case_probabilities(judged),
         case_ambiguity(judged),
         noise_level,
-        inside,
-        outside,
-        {"fit": fit_table, "held_out": held_table},
+        fit_residuals,
+        held_out_residuals,
+        {"fit": fit_table, "held_out": held_out_table},
         terms,
         runs,
         note,
         curves,
-        _own_errors(fitted, noise_level),
+        _own_errors(fit_problem, noise_level),
     )
 
 
 def _own_errors(problem: Problem, noise_level: dict[Key, NoiseLevel]) -> dict[str, float]:
     """Standard deviation of each channel by the error that is taken for the model's own [SI]."""
-    sizes = {}
-    for block in problem.blocks:
-        levels = [noise_level[block.name, p.recording.name] for p in problem.recordings]
-        sizes[block.channel] = math.sqrt(
-            sum(level.error_variance for level in levels) / len(levels)
-        )
-    return sizes
+    names = [p.recording.name for p in problem.recordings]
+    return {
+        b.channel: math.sqrt(sum(noise_level[b.name, n].error_variance for n in names) / len(names))
+        for b in problem.blocks
+    }
 
 
 def _sound_models(
     nominal: Rig,
-    fitted: Problem,
-    held: Problem,
+    fit_problem: Problem,
+    held_out_problem: Problem,
     groups: list[BlockGroup],
     noise_level: dict[Key, NoiseLevel],
 ) -> tuple[Models, dict[str, dict[Key, Residual]], dict[str, dict[Key, Residual]]]:
@@ -243,22 +247,24 @@ def _sound_models(
     where a value called wrong is inside its tolerances. The answer that nothing is missing is taken
     out where the model misses far more than noise and its own error.
     """
-    settings, errors = fitted.settings, _own_errors(fitted, noise_level)
-    groups = [drop_undetermined(group, fitted) for group in groups]
+    settings, errors = fit_problem.settings, _own_errors(fit_problem, noise_level)
+    groups = [drop_undetermined(group, fit_problem) for group in groups]
     while True:
         judged = judge(groups, settings)
-        models = _models(nominal, fitted, judged, case_verdict(j.verdict for j in judged))
-        inside = models.residuals(fitted)
-        outside = inside if held is fitted else models.residuals(held)
-        problem, by_stage = (fitted, inside) if held is fitted else (held, outside)
-        table = _table(problem, by_stage, noise_level)
+        models = _models(nominal, fit_problem, judged, case_verdict(j.verdict for j in judged))
+        fit_residuals = models.residuals(fit_problem)
+        held_out_residuals = (
+            fit_residuals if held_out_problem is fit_problem else models.residuals(held_out_problem)
+        )
+        # where there are no others both are those of the fitted recordings
+        table = _table(held_out_problem, held_out_residuals, noise_level)
         blamed = _blamed(models.judged, spoiled_channels(table)) | _needless(models, settings)
         blamed |= _worse_than_file(models.judged, table, settings.noise_margin - 1.0)
         missing = {k: _missed(j, table, errors) for k, j in enumerate(models.judged)}
         if not blamed and not any(missing.values()):
-            return models, inside, outside
+            return models, fit_residuals, held_out_residuals
         groups = [
-            _without_name(group, models.judged[k])
+            _without_addition(group, models.judged[k])
             if k in blamed
             else _with_mismatch(group, missing[k])
             for k, group in enumerate(groups)
@@ -275,7 +281,7 @@ def _needless(models: Models, settings: DiagnosisSettings) -> set[int]:
     }
 
 
-def _without_name(group: BlockGroup, judged: Judged) -> BlockGroup:
+def _without_addition(group: BlockGroup, judged: Judged) -> BlockGroup:
     """Group without what it adds to the model: its name, or the form of what has none."""
     if judged.added:
         return put_aside(group, judged.chosen.hypothesis)
@@ -346,11 +352,13 @@ def _additions(judged: Judged) -> tuple[Term, ...]:
     return judged.named or (closure.effects if closure is not None else ())
 
 
-def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -> Models:
+def _models(nominal: Rig, fit_problem: Problem, judged: list[Judged], verdict: str) -> Models:
     """The rig at every stage, from the verdicts of the groups."""
-    refitted = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
-    baseline = _merged(nominal, refitted)
-    starts = _widened(fitted, judged, refitted)
+    refitted = _with_common_zeros(
+        nominal, fit_problem, judged, [j.group.candidates[0] for j in judged]
+    )
+    baseline = _merged_rig(nominal, refitted)
+    starts = _with_stated_stds(fit_problem, judged, refitted)
     if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
         final = nominal if verdict == "none" else baseline
         return Models(
@@ -364,13 +372,13 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
             verdict,
         )
     wanted = [_model_of(j, start) for j, start in zip(judged, refitted, strict=True)]
-    settled = _settled(nominal, fitted, judged, wanted)
-    chosen = _widened(fitted, judged, settled)
+    settled = _with_common_zeros(nominal, fit_problem, judged, wanted)
+    chosen = _with_stated_stds(fit_problem, judged, settled)
     judged = [
         replace(j, chosen=c) if j.named or j.wrong else j
         for j, c in zip(judged, chosen, strict=True)
     ]
-    final = _merged(nominal, settled)
+    final = _merged_rig(nominal, settled)
     owners = owners_of_parameters(settled)
     return Models(judged, starts, chosen, owners, nominal, baseline, final, verdict)
 
@@ -422,8 +430,10 @@ def _models_of(
     healthy = {h.rest: p for h, p in probabilities.items() if h in (NONE, PARAMETERS)}
 
     def model(chosen: list[FittedHypothesis]) -> Rig:
-        stated = _widened(problem, judged, chosen)
-        return with_std(_merged(nominal, chosen), nominal, stated, owners_of_parameters(chosen))
+        with_stds = _with_stated_stds(problem, judged, chosen)
+        return with_std(
+            _merged_rig(nominal, chosen), nominal, with_stds, owners_of_parameters(chosen)
+        )
 
     likeliest = max(healthy, key=lambda rest: healthy[rest], default="")
     if sum(healthy.values()) >= least:
@@ -433,7 +443,7 @@ def _models_of(
         wanted = hypothesis.set
         if p < least or hypothesis.rest or not all(t.id in CATALOGUE or t.is_value for t in wanted):
             continue
-        chosen = [_inside(j.group, wanted) for j in judged]
+        chosen = [_within(j.group, wanted) for j in judged]
         if any(c.fit.events is not None for c in chosen):
             continue
         if {term for c in chosen for term in c.terms} == wanted:
@@ -441,7 +451,7 @@ def _models_of(
     return likely
 
 
-def _inside(group: BlockGroup, wanted: frozenset[Term]) -> FittedHypothesis:
+def _within(group: BlockGroup, wanted: frozenset[Term]) -> FittedHypothesis:
     """The most probable hypothesis of a group that names nothing else than what is wanted; the
     baseline where there is none.
     """
@@ -451,7 +461,7 @@ def _inside(group: BlockGroup, wanted: frozenset[Term]) -> FittedHypothesis:
     )
 
 
-def _settled(
+def _with_common_zeros(
     nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[FittedHypothesis]
 ) -> list[FittedHypothesis]:
     """Refit groups with sensors' zeros held that another group determines better and differently.
@@ -480,14 +490,14 @@ def _settled(
                 start_of(candidate.fit, effect, LEAST_START) for effect in effects
             )
             settled = {n: other.values[n] for n, other in common.items()}
-            autocorrelation = autocorrelation_of(part, candidate.fit, judged[k].group.noise_level)
+            inflation = inflation_of(part, candidate.fit, judged[k].group.noise_level)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
                 again = fit(
                     part,
                     nominal,
                     effects,
                     free,
-                    autocorrelation,
+                    inflation,
                     fixed=fixed,
                     warm=candidate.fit,
                     share=FINAL_STEP_SHARE,
@@ -499,34 +509,37 @@ def _settled(
     return settled_candidates
 
 
-def _widened(
+def _with_stated_stds(
     problem: Problem, judged: list[Judged], chosen: list[FittedHypothesis]
 ) -> list[FittedHypothesis]:
     """The fits of the groups with the standard deviations that are stated."""
     return [with_stated_std(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
 
 
-def _merged(nominal: Rig, candidates: list[FittedHypothesis]) -> Rig:
+def _merged_rig(nominal: Rig, candidates: list[FittedHypothesis]) -> Rig:
     """One rig from the groups' fits; where two have a value of their own, that of the group that
     knows it best.
     """
     rig = nominal
-    for _, entry in _added(nominal, candidates):
+    for _, entry in _added_effects(nominal, candidates):
         rig = with_entry(rig, entry)
     owners = owners_of_parameters(candidates).items()
     return with_known(rig, {name: candidates[k].fit.values[name] for name, k in owners})
 
 
-def _added(
+def _added_effects(
     nominal: Rig, candidates: list[FittedHypothesis]
 ) -> Iterator[tuple[FittedHypothesis, dict[str, Any]]]:
     """Effects that the fits have and the nominal model has not, each from the fit that knows it
     best.
     """
-    owners, stated = owners_of_effects(candidates), {entry["id"] for entry in nominal.effects}
+    owners, nominal_effects = (
+        owners_of_effects(candidates),
+        {entry["id"] for entry in nominal.effects},
+    )
     for k, candidate in enumerate(candidates):
         for entry in candidate.fit.rig.effects:
-            if entry["id"] not in stated and owners.get(Term.of(entry), k) == k:
+            if entry["id"] not in nominal_effects and owners.get(Term.of(entry), k) == k:
                 yield candidate, entry
 
 
@@ -538,7 +551,7 @@ def with_std(
     """
     spread = {name: candidates[k].fit.std[name] for name, k in owners.items()}
     rig = with_known(rig, {}, {name: s for name, s in spread.items() if math.isfinite(s)})
-    for candidate, entry in _added(nominal, candidates):
+    for candidate, entry in _added_effects(nominal, candidates):
         known = Term.of(entry).own(candidate.fit.std)
         rig = with_entry(rig, entry, {n: s for n, s in known.items() if math.isfinite(s)})
     return rig
@@ -550,21 +563,16 @@ def _table(
     """Error of every channel at every stage."""
     out = {}
     for block in problem.blocks:
-        errors = {}
-        noise, weights = [], []
-        for prepared in problem.recordings:
-            noise.append(noise_level[block.name, prepared.recording.name].sample ** 2)
-            weights.append(
-                max(1, int(by_stage["refit"][block.name, prepared.recording.name].rows.sum()))
-            )
-        level = math.sqrt(float(np.average(noise, weights=weights)))
+        keys = [(block.name, p.recording.name) for p in problem.recordings]
+        weights = [max(1, int(by_stage["refit"][key].rows.sum())) for key in keys]
+        squares = [[noise_level[key].sample ** 2 for key in keys]]
         for stage in ("before", "refit", "after"):
-            squares = []
-            for prepared in problem.recordings:
-                r = by_stage[stage][block.name, prepared.recording.name]
-                squares.append(float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0)
-            errors[stage] = math.sqrt(float(np.average(squares, weights=weights)))
-        out[block.channel] = ChannelError(level, errors["before"], errors["refit"], errors["after"])
+            left = [by_stage[stage][key] for key in keys]
+            squares.append(
+                [float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0 for r in left]
+            )
+        errors = [math.sqrt(float(np.average(one, weights=weights))) for one in squares]
+        out[block.channel] = ChannelError(*errors)
     return out
 
 

@@ -201,8 +201,8 @@ def next_to_record(
     hypotheses: Sequence[Modelled],
     nominal: Rig,
     judged: list[Judged],
-    fitted: Problem,
-    held: Problem,
+    fit_problem: Problem,
+    held_out_problem: Problem,
 ) -> NextExperiment:
     """Choose what to record next.
 
@@ -218,7 +218,7 @@ def next_to_record(
         The nominal model.
     judged : list of Judged
         The groups with their verdicts.
-    fitted, held : Problem
+    fit_problem, held_out_problem : Problem
         Recordings to fit and held-out ones (the same object when there are no others).
 
     Returns
@@ -226,8 +226,11 @@ def next_to_record(
     NextExperiment
         With what tells each open pair apart, and commands that the rig can play.
     """
-    recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
-    asked = _Question(nominal, judged, fitted.blocks, recordings, fitted)
+    recordings = [
+        *fit_problem.recordings,
+        *(held_out_problem.recordings if held_out_problem is not fit_problem else []),
+    ]
+    asked = _Question(nominal, judged, fit_problem.blocks, recordings, fit_problem)
     same = same_data(ambiguity)
     simulated: NextExperiment | None = None
     first = _first_asked(diagnosis.answer)
@@ -240,8 +243,8 @@ def next_to_record(
                 hypotheses,
                 asked.noise,
                 recordings,
-                settings=fitted.settings,
-                losses=fitted.losses,
+                settings=fit_problem.settings,
+                losses=fit_problem.losses,
             )
     if simulated is not None and not simulated.excitation:
         simulated = None  # of what is open one has a model

@@ -21,7 +21,7 @@ from pamrs.diagnosis.fit import Key, Problem, free_baseline, residuals
 from pamrs.diagnosis.limits import counted
 from pamrs.diagnosis.noise import (
     bins_of,
-    model_error,
+    curve_errors_of,
     noise_levels,
     whitening,
 )
@@ -311,14 +311,14 @@ def errors_of(problem: Problem, rig: Rig, visited: Sequence[Prepared] = ()) -> E
         Further recordings whose ranges the curves of that error run over.
     """
     fewer = replace(problem, settings=replace(problem.settings, noise_replicates=REPLICATES))
-    stated = model_error(rig, problem.settings.usual_error)
-    levels = noise_levels(fewer, core_rig(rig), stated, [*problem.recordings, *visited])
+    curve_errors = curve_errors_of(rig, problem.settings.usual_error)
+    levels = noise_levels(fewer, core_rig(rig), curve_errors, [*problem.recordings, *visited])
     out = {}
     for prepared in problem.recordings:
         for block in problem.blocks:
             level = levels[block.name, prepared.recording.name]
             white = prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
-            weight = max(1.0, level.noise / white)
+            weight = max(1.0, level.binned_noise / white)
             bins = max(1, prepared.n // bins_of(prepared))
             # what differs is smooth over a bin: its mean square in all of them is that of a few
             size = counted(prepared, block, problem.settings) / bins

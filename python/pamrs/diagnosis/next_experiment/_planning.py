@@ -25,7 +25,7 @@ from pamrs.diagnosis.next_experiment._differences import (
 )
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan
 from pamrs.diagnosis.next_experiment._words import words
-from pamrs.diagnosis.noise import model_error, noise_levels
+from pamrs.diagnosis.noise import curve_errors_of, noise_levels
 from pamrs.diagnosis.prepare import Block, Prepared, available_blocks, with_unjudged_starts
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
@@ -335,8 +335,8 @@ def _products(
     """Products of all that one experiment shows; the model's error runs over what all visit."""
     few = replace(settings, noise_replicates=REPLICATES)
     problem = Problem(blocks, [prepared], core_rig(rig), few)
-    stated = model_error(rig, settings.usual_error)
-    level = noise_levels(problem, problem.core, stated, visited)
+    curve_errors = curve_errors_of(rig, settings.usual_error)
+    level = noise_levels(problem, problem.core, curve_errors, visited)
     return products_of(problem, rig, starts, baseline, level)
 
 

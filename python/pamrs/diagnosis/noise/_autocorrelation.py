@@ -1,4 +1,4 @@
-"""Autocorrelation time of residuals, and the weight that they have by it."""
+"""Autocorrelation time of residuals, and the inflation by which fits take them less seriously."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _most(values: dict[Key, float]) -> float:
     return _APART * max(1.0, ordered[(len(ordered) - 1) // 2]) if ordered else 0.0
 
 
-def inflation(
+def usual_inflation(
     block: Block, recordings: list[Prepared], residuals: dict[Key, Residual], width: float
 ) -> float:
     """Variance of a block's bin means relative to white sample noise, times their correlation time
@@ -70,7 +70,7 @@ def inflation(
     return max(1.0, float(np.mean(usual))) if usual else 1.0
 
 
-def apart(
+def inflation_apart(
     block: Block, recordings: list[Prepared], residuals: dict[Key, Residual], width: float
 ) -> dict[Key, float]:
     """Inflation of each recording in which it is far larger than in half of them."""

@@ -1,4 +1,6 @@
-"""Error that a rig file states for its model, as curves: the change of a block's output by each."""
+"""Curve error of a model, stated in its rig file or usual: smooth curves over what is measured, and
+the change of a block's output by each.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +17,15 @@ from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-# waves of a stated error: a shift, one to fifteen half periods over the visited (decision 95)
+# waves of a curve: a shift, one to fifteen half periods over the range of a signal (decision 95)
 _CURVE_WAVES = 16
 
 
 Array = NDArray[np.float64]
-Stated = Mapping[str, Mapping[str, float]]
+CurveErrors = Mapping[str, Mapping[str, float]]
+"""Sizes of curve errors by block or channel, as :attr:`pamrs.Rig.model_error`."""
 OperatingRanges = Mapping[str, tuple[float, float]]
-"""Least value and width of what was visited, by channel [SI]."""
+"""Least value and width of each signal over some recordings, by channel [SI]."""
 
 _FLOWS = {"supply": ("supply", "line"), "chamber": ("line", "chamber")}
 """Blocks of a rig file whose share of error is one of the flow into a block, beside the valve."""
@@ -40,8 +43,8 @@ _MOTION = ("joint_angle", "length")
 _DRIVEN_COMMANDS = with_trait("driven")
 
 
-def model_error(rig: Rig, usual: float) -> Stated:
-    """The error of a model: as the rig file states it, and of what that leaves out a usual one.
+def curve_errors_of(rig: Rig, usual: float) -> CurveErrors:
+    """Curve errors of a model: as the rig file states them, and usual ones of what that leaves out.
 
     Parameters
     ----------
@@ -80,13 +83,13 @@ def curves(
     base: Residual,
     prepared: Prepared,
     ranges: OperatingRanges,
-    stated: Stated,
+    curve_errors: CurveErrors,
     width: int,
 ) -> Array | None:
-    """The stated error of a model as a Gaussian process (Kennedy & O'Hagan 2001) of a few curves,
+    """The curve error of a model as a Gaussian process (Kennedy & O'Hagan 2001) of a few curves,
     carried through the model.
 
-    What a rig file states is the standard deviation of a smooth curve: over a reading that of its
+    Its size is the standard deviation of a smooth curve: over a reading that of its
     gauge, over the motion that of a force, over the command that of a valve, over the pressure that
     of a flow. It is a sum of waves, each of them a column.
 
@@ -101,10 +104,10 @@ def curves(
     prepared : Prepared
         The recording.
     ranges : dict
-        As of `visited`: over these a curve runs, so that column k is one and the same curve in
-        every recording.
-    stated : dict
-        The model's error as the rig file states it (:attr:`pamrs.Rig.model_error`).
+        As of `operating_ranges`: over these a curve runs, so that column k is one and the same
+        curve in every recording.
+    curve_errors : dict
+        From :func:`curve_errors_of`.
     width : int
         Samples in a bin.
 
@@ -131,13 +134,13 @@ def curves(
         return binned(values, base.rows, width)[0]
 
     columns: list[Array] = []
-    reading_error = _size(stated, block.channel, ranges)
+    reading_error = _size(curve_errors, block.channel, ranges)
     if reading_error > 0.0:
         columns += [means(base.freed(reading_error * curve)) for curve in over(block.channel)]
-    for place, share in _flow_errors(block, ranges, stated):
+    for place, share in _flow_errors(block, ranges, curve_errors):
         moved = _flowing(share * np.column_stack(over(place)), base)
         columns += [means(base.freed(column)) for column in moved.T]
-    for name, place, much in _drive_errors(block, prepared, ranges, stated):
+    for name, place, much in _drive_errors(block, prepared, ranges, curve_errors):
         columns += [
             means(_carried(name, much * curve, block, core, prepared, base))
             for curve in over(place)
@@ -152,23 +155,25 @@ def _signal(prepared: Prepared, name: str) -> Array | None:
     return prepared.commands.get(name)
 
 
-def _size(stated: Stated, name: str, ranges: OperatingRanges) -> float:
-    """Stated error of a reading [SI]; a share is one of what was visited."""
+def _size(curve_errors: CurveErrors, name: str, ranges: OperatingRanges) -> float:
+    """Curve error of a reading [SI]; a share is one of the width of its range."""
     if name not in ranges:
         return 0.0
-    error = stated.get(name, stated.get(channel_of(name), {}))
+    error = curve_errors.get(name, curve_errors.get(channel_of(name), {}))
     return math.hypot(error.get("size", 0.0), error.get("share", 0.0) * ranges[name][1])
 
 
-def _shares(stated: Stated, kinds: tuple[str, ...], name: str | None = None) -> float:
+def _shares(curve_errors: CurveErrors, kinds: tuple[str, ...], name: str | None = None) -> float:
     """The shares of some kinds of block together; of named ones those called `name` alone."""
-    named = [n for n in stated if channel_of(n) in kinds]
+    named = [n for n in curve_errors if channel_of(n) in kinds]
     if name is not None:
         named = [n for n in named if block_of(n) in ("", name)]
-    return math.hypot(*(stated[n].get("share", 0.0) for n in named))
+    return math.hypot(*(curve_errors[n].get("share", 0.0) for n in named))
 
 
-def _flow_errors(block: Block, ranges: OperatingRanges, stated: Stated) -> list[tuple[str, float]]:
+def _flow_errors(
+    block: Block, ranges: OperatingRanges, curve_errors: CurveErrors
+) -> list[tuple[str, float]]:
     """Signals over which errors of the flow into a block are curves, each with its share."""
     if block.kind not in _FLOWS or block.channel not in ranges:
         return []
@@ -177,14 +182,14 @@ def _flow_errors(block: Block, ranges: OperatingRanges, stated: Stated) -> list[
         (n for n in block.drives if channel_of(n) in _DRIVEN_COMMANDS and n in ranges), None
     )
     errors = [
-        (block.channel, _shares(stated, _FLOWS[block.kind], name)),
-        (command or block.channel, _shares(stated, ("valve",), name)),
+        (block.channel, _shares(curve_errors, _FLOWS[block.kind], name)),
+        (command or block.channel, _shares(curve_errors, ("valve",), name)),
     ]
     return [(place, share) for place, share in errors if share > 0.0]
 
 
 def _drive_errors(
-    block: Block, prepared: Prepared, ranges: OperatingRanges, stated: Stated
+    block: Block, prepared: Prepared, ranges: OperatingRanges, curve_errors: CurveErrors
 ) -> list[tuple[str, str, Array]]:
     """Errors of drives: the drive, the signal over which its error is a curve, and its size [SI];
     of the reading itself, and of the force that a pressure makes.
@@ -196,11 +201,11 @@ def _drive_errors(
         if name not in prepared.signals:
             continue
         value, (low, wide) = prepared.signals[name][0], ranges[name]
-        errors = [(name, _size(stated, name, ranges), np.ones_like(value))]
+        errors = [(name, _size(curve_errors, name, ranges), np.ones_like(value))]
         if block.mechanical and channel_of(name) == "muscle_pressure":
             most = np.full_like(value, max(abs(low), abs(low + wide)))
-            errors.append((motion or name, _shares(stated, _FACTORS), value))
-            errors.append((motion or name, _shares(stated, _SUMMANDS), most))
+            errors.append((motion or name, _shares(curve_errors, _FACTORS), value))
+            errors.append((motion or name, _shares(curve_errors, _SUMMANDS), most))
         drive_errors += [(name, place, size * much) for place, size, much in errors if size > 0.0]
     return drive_errors
 

@@ -1,10 +1,10 @@
-"""Noise levels, excess of residuals over them, and statistics of autocorrelated residuals."""
+"""Noise levels, excess of residuals over them, and the inflation of fits by both."""
 
 from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from zlib import crc32
 
@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
 from pamrs import _core
-from pamrs.diagnosis.fit import FIT_BIN_TIME, PIECE_TIME, Key, Problem, bin_width
-from pamrs.diagnosis.noise._autocorrelation import inflated
-from pamrs.diagnosis.noise._discrepancy import Stated, curves, operating_ranges, whitening
+from pamrs.diagnosis.fit import FIT_BIN_TIME, PIECE_TIME, Fit, Inflation, Key, Problem, bin_width
+from pamrs.diagnosis.noise._autocorrelation import inflated, inflation_apart, usual_inflation
+from pamrs.diagnosis.noise._discrepancy import CurveErrors, curves, operating_ranges, whitening
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual, smoothed
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import SimulationError
 
 _BIN_TIME = 0.1  # [s] bins of residuals against noise: what is missing is slower (decision 14)
 _LEAST_BIN_SAMPLES = 5  # fewest samples of such a bin
-# numbers of a stated error, as its square scatters: bumps of a force curve over a stroke
-_STATED_FREEDOM = 4.0
+# numbers of a curve error, as its square scatters: bumps of a force curve over a stroke
+_CURVE_FREEDOM = 4.0
 # share of that variance that no curve tells: an error is no exact curve of one value (decision 95)
 _CURVE_REST = 0.02
 # shares of the usual error that are tried (decision 95)
@@ -39,27 +39,27 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NoiseLevel:
-    """Level of a block's residual over one recording by noise, and by the stated error of the
-    model.
+    """Level of a block's residual over one recording by noise, and by the curve error of the model
+    (stated or usual): of single samples, and of bin means (bins of :func:`bins_of` samples).
 
     Attributes
     ----------
     sample : float
         Standard deviation of single samples: the output's own noise and that of the drives.
     binned : float
-        Standard deviation of bin means, with the error that the rig file says the model has.
+        Standard deviation of bin means by noise and curve error together.
     scatter : float
         Standard deviation, from one realisation of the noise to another, of the logarithm of the
         mean square of the bin means.
-    stated : float
-        Share of the variance of bin means that is the stated error of the model.
-    beside : float
-        Standard deviation of bin means beside what curves of the stated error tell of them.
-    rest : float
-        Share of that variance that is what no such curve tells.
+    curve_share : float
+        Share of the variance of bin means that is the curve error.
+    beside_curves : float
+        Standard deviation of bin means beside what its curves tell of them.
+    rest_share : float
+        Share of that variance that is curve error which no such curve tells.
     curves : (m, k) array or None
-        What each curve of the stated error, one standard deviation high, does to the bin means;
-        None where no error is stated.
+        What each curve, one standard deviation high, does to the bin means; None where no curve
+        error acts.
     inflation : float
         Variance of the means of a fit's bins relative to white noise of the output, times their
         correlation time: by so much fits take a block's residual less seriously.
@@ -68,30 +68,34 @@ class NoiseLevel:
     sample: float
     binned: float
     scatter: float = 0.0
-    stated: float = 0.0
-    beside: float = 0.0
-    rest: float = 0.0
+    curve_share: float = 0.0
+    beside_curves: float = 0.0
+    rest_share: float = 0.0
     curves: Array | None = field(default=None, repr=False, compare=False)
     inflation: float = 1.0
 
     @property
     def noise_variance(self) -> float:
         """Variance of bin means by noise alone."""
-        return (1.0 - self.stated) * self.binned**2
+        return (1.0 - self.curve_share) * self.binned**2
 
     @property
     def error_variance(self) -> float:
-        """Variance of bin means by the error of the model."""
-        return self.stated * self.binned**2
+        """Variance of bin means by the curve error."""
+        return self.curve_share * self.binned**2
 
     @property
-    def noise(self) -> float:
+    def binned_noise(self) -> float:
         """Standard deviation of bin means by noise alone."""
         return math.sqrt(max(0.0, self.noise_variance))
 
     def curves_in_noises(self, bins: NDArray[np.intp]) -> Array:
         """The curves at some bins (n, k) in units of that noise; no column where there are none."""
-        return np.empty((bins.size, 0)) if self.curves is None else self.curves[bins] / self.noise
+        return (
+            np.empty((bins.size, 0))
+            if self.curves is None
+            else self.curves[bins] / self.binned_noise
+        )
 
 
 @dataclass(frozen=True)
@@ -101,9 +105,10 @@ class Excess:
     Attributes
     ----------
     ratio : float
-        Variance of bin means over that of the noise level; 1 when only noise is left.
+        Variance of bin means over that of the noise level of bin means; 1 when only noise is left.
     systematic : float
-        Standard deviation of what is not noise, over all recordings, in units of `noise`.
+        Standard deviation of what is not noise in bin means, over all recordings, in noise levels
+        of single samples: in units of `noise`.
     p_value : float
         Chance of such a ratio (above the margin) from noise, by the scatter of the noise levels.
     limit : float
@@ -135,8 +140,8 @@ def bins_of(prepared: Prepared) -> int:
 def noise_levels(
     problem: Problem,
     core: _core.Rig,
-    stated: Stated | None = None,
-    visited: list[Prepared] | None = None,
+    curve_errors: CurveErrors | None = None,
+    range_recordings: list[Prepared] | None = None,
 ) -> dict[Key, NoiseLevel]:
     """Noise levels of all blocks and recordings, the drives' noise carried through the model by
     simulation.
@@ -147,16 +152,17 @@ def noise_levels(
         Blocks and recordings.
     core : _core.Rig
         A model close to the data.
-    stated : dict, optional
-        The model's error as the rig file states it (:attr:`pamrs.Rig.model_error`): excess inside
-        it is none.
-    visited : list of Prepared, optional
-        Recordings whose ranges the curves of that error run over; those of the problem by default.
+    curve_errors : dict, optional
+        From :func:`curve_errors_of`: excess inside them is none.
+    range_recordings : list of Prepared, optional
+        Recordings whose ranges their curves run over; those of the problem by default.
     """
     levels: dict[Key, NoiseLevel] = {}
-    settings, known = problem.settings, stated or {}
+    settings, known = problem.settings, curve_errors or {}
     ranges = {
-        b.name: operating_ranges(b, visited or problem.recordings) for b in problem.blocks if known
+        b.name: operating_ranges(b, range_recordings or problem.recordings)
+        for b in problem.blocks
+        if known
     }
     for prepared in problem.recordings:
         seed = [settings.seed, crc32(prepared.recording.name.encode())]
@@ -165,7 +171,7 @@ def noise_levels(
             base = residual(block, core, prepared, [])
             width = bins_of(prepared)
             powers: list[list[float]] = []
-            weights: list[float] = []
+            inflations: list[float] = []
             noisy = [name for name in block.drives if name in prepared.signals]
             rows = base.rows
             _, counts = binned(base.value, rows, width)
@@ -183,7 +189,9 @@ def noise_levels(
                     )
                 means, _ = binned(disturbed, rows, width)
                 raw = disturbed + base.freed(white_noise.normal(0.0, base.noise, prepared.n))
-                weights.append(inflated(raw, rows, bin_width(prepared, FIT_BIN_TIME), base.noise))
+                inflations.append(
+                    inflated(raw, rows, bin_width(prepared, FIT_BIN_TIME), base.noise)
+                )
                 own_noise = _own_noise(block, base, prepared, counts, width, rng)[usable]
                 parts = (disturbed[rows], means[usable], means[usable] + own_noise, own_noise)
                 powers.append([float(np.mean(v**2)) for v in parts])
@@ -211,7 +219,7 @@ def noise_levels(
                 math.sqrt(base.noise**2 + sample),
                 scatter=scatter,
                 curves=bent,
-                inflation=max(1.0, float(np.mean(weights))) if weights else 1.0,
+                inflation=max(1.0, float(np.mean(inflations))) if inflations else 1.0,
                 **_with_error(noise, error),
             )
     return levels
@@ -220,19 +228,19 @@ def noise_levels(
 def means_in_noises(
     prepared: Prepared, block_residual: Residual, level: NoiseLevel
 ) -> tuple[NDArray[np.intp], Array]:
-    """The bins of a recording that are usable (n,), and the means of a residual in them in units of
-    their noise (n,); none where there is no noise.
+    """The bins of a recording that are usable (n,), and the means of a residual in them in noise
+    levels of bin means (n,), the curve error left out; none where there is no noise.
     """
     means, counts = binned(block_residual.value, block_residual.rows, bins_of(prepared))
-    usable = np.flatnonzero(counts if level.noise > 0.0 else ())
-    return usable, means[usable] / level.noise if usable.size else np.empty(0)
+    usable = np.flatnonzero(counts if level.binned_noise > 0.0 else ())
+    return usable, means[usable] / level.binned_noise if usable.size else np.empty(0)
 
 
 def error_sizes(
     problem: Problem, residuals: dict[Key, Residual], noise_level: dict[Key, NoiseLevel]
 ) -> tuple[dict[str, float], float]:
-    """Most probable size of the model's error in each block, as a share of the usual one and at
-    most 1, by what a hypothesis leaves; and the log evidence of these sizes.
+    """Most probable size of the curve error in each block, as a share of the stated or usual one
+    and at most 1, by what a hypothesis leaves; and the log evidence of these sizes.
 
     The residuals are those of one Gaussian process with curves of that size, which has a log-normal
     prior about the usual one: recordings that show a model to be better than usual may show what
@@ -265,7 +273,9 @@ def error_sizes(
                 continue
             rows.append(means)
             bent.append(level.curves_in_noises(usable))
-            rest.append(np.full(means.size, _CURVE_REST * level.stated / (1.0 - level.stated)))
+            rest.append(
+                np.full(means.size, _CURVE_REST * level.curve_share / (1.0 - level.curve_share))
+            )
         sizes[block.name] = 1.0
         if rows:
             y, c, r = np.concatenate(rows), np.concatenate(bent), np.concatenate(rest)
@@ -293,7 +303,7 @@ def _evidence(rows: Array, curves: Array, rest: Array, size: float) -> float:
 def with_sizes(
     noise_level: dict[Key, NoiseLevel], sizes: dict[str, float]
 ) -> dict[Key, NoiseLevel]:
-    """Noise levels with the error of each block's model so many times as large."""
+    """Noise levels with the curve error of each block so many times as large."""
 
     def scaled(level: NoiseLevel, size: float) -> NoiseLevel:
         if level.curves is None:
@@ -305,13 +315,13 @@ def with_sizes(
 
 
 def _with_error(noise: float, error: float) -> dict[str, float]:
-    """Entries of a noise level by the variances of noise and of an error of the model."""
+    """Entries of a noise level by the variances of bin means by noise and by curve error."""
     rest = _CURVE_REST * error
     return {
         "binned": math.sqrt(noise + error),
-        "stated": error / (noise + error),
-        "beside": math.sqrt(noise + rest),
-        "rest": rest / (noise + rest),
+        "curve_share": error / (noise + error),
+        "beside_curves": math.sqrt(noise + rest),
+        "rest_share": rest / (noise + rest),
     }
 
 
@@ -372,9 +382,9 @@ def excess(
 ) -> Excess:
     """Pool a block's residual over recordings and compare it with its noise level.
 
-    Where the rig file states an error of the model, all of the residual is compared with noise and
-    that error together; and what the most probable curves of that error leave of it, with what they
-    cost, with the noise beside them. The one that is farther above its limit counts.
+    Where the model has a curve error, all of the residual is compared with noise and that error
+    together; and what its most probable curves leave of it, with what they cost, with the noise
+    beside them. The one that is farther above its limit counts.
     """
     width = {p.recording.name: bins_of(p) for p in recordings}
     bins = {
@@ -388,7 +398,8 @@ def excess(
     if all(level.curves is None for level in whole.values()):
         return against_all
     apart = {
-        key: replace(level, binned=level.beside, stated=level.rest) for key, level in whole.items()
+        key: replace(level, binned=level.beside_curves, curve_share=level.rest_share)
+        for key, level in whole.items()
     }
     beside = _pooled(recordings, _beside_curves(bins, apart), residuals, apart, settings)
     return max(against_all, beside, key=lambda e: e.ratio / e.limit)
@@ -399,8 +410,8 @@ Bins = dict[Key, tuple[Array, Array]]
 
 
 def _beside_curves(bins: Bins, levels: dict[Key, NoiseLevel]) -> Bins:
-    """Bin means without the most probable curves of the model's error, so that noise and such
-    curves alone leave the variance of the noise (one curve for all recordings).
+    """Bin means without the most probable curves, so that noise and such curves alone leave the
+    variance of the noise (one curve for all recordings).
     """
     known = [key for key, level in levels.items() if level.curves is not None]
     usable = {key: bins[key][1] > 0 for key in known}
@@ -452,17 +463,17 @@ def _pooled(
     ratio = float(np.average(ratios, weights=weights))
     shares = np.array(weights) / sum(weights)
     # noise levels are means of as many realisations, and their scatter is known from no more
-    random = [(1.0 - noise_level[key].stated) * noise_level[key].scatter for key in keys]
+    random = [(1.0 - noise_level[key].curve_share) * noise_level[key].scatter for key in keys]
     pooled = math.sqrt(float(np.sum((shares * random) ** 2)))
     scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.noise_replicates))
     chance = t(len(keys) * (settings.noise_replicates - 1))
     beyond = min(float(chance.isf(settings.noise_chance)) * scatter, _MOST_EXPONENT)
     # the model has one error, the same in all recordings, and its square is that of a few numbers
-    stated = float(np.sum(shares * [noise_level[key].stated for key in keys]))
-    larger = 1.0 + stated * (
-        float(chi2.isf(settings.noise_chance, _STATED_FREEDOM)) / _STATED_FREEDOM - 1.0
+    curve_share = float(np.sum(shares * [noise_level[key].curve_share for key in keys]))
+    larger = 1.0 + curve_share * (
+        float(chi2.isf(settings.noise_chance, _CURVE_FREEDOM)) / _CURVE_FREEDOM - 1.0
     )
-    scatter = math.hypot(scatter, stated * math.sqrt(2.0 / _STATED_FREEDOM))
+    scatter = math.hypot(scatter, curve_share * math.sqrt(2.0 / _CURVE_FREEDOM))
     margin = settings.noise_margin * larger
     noise = math.sqrt(float(np.average(noises, weights=weights)))
     return Excess(
@@ -474,4 +485,35 @@ def _pooled(
         margin * math.exp(beyond),
         scatter,
         tuple(pieces),
+    )
+
+
+def no_inflation(blocks: Iterable[Block]) -> dict[str, float]:
+    """Inflation of blocks whose residual is white noise: 1 for each."""
+    return dict.fromkeys((b.name for b in blocks), 1.0)
+
+
+def inflation_of(problem: Problem, fitted: Fit, noise_level: Mapping[Key, NoiseLevel]) -> Inflation:
+    """Inflation by the autocorrelation that a fit leaves in each block, at the least that of the
+    noise: parameters that follow the noise of a drive leave too little of it. A recording that is
+    missed by far more than most has one of its own, so that it takes no weight from the others.
+    """
+
+    def noise_of(block: Block) -> float:
+        keys = [(block.name, p.recording.name) for p in problem.recordings]
+        levels = [noise_level[key].inflation for key in keys if key in noise_level]
+        return float(np.mean(levels)) if levels else 1.0
+
+    recordings_and_residuals = problem.recordings, fitted.residuals, FIT_BIN_TIME
+    usual = {
+        b.name: max(noise_of(b), usual_inflation(b, *recordings_and_residuals))
+        for b in problem.blocks
+    }
+    return Inflation(
+        usual,
+        {
+            key: of_recording
+            for b in problem.blocks
+            for key, of_recording in inflation_apart(b, *recordings_and_residuals).items()
+        },
     )

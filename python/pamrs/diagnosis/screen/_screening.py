@@ -390,7 +390,7 @@ class _SignatureSearch:
 
 def _values(start: Start) -> _Values:
     """Effect, form and values of a start, wherever it acts."""
-    values = start.free | start.held
+    values = start.free | start.fixed
     unplaced = tuple(sorted((n.removeprefix(str(start.effect)), v) for n, v in values.items()))
     return start.effect.id, start.form, unplaced
 
@@ -423,7 +423,7 @@ def _moved_to_action(starts: list[Start], problem: Problem, rig: Rig) -> list[St
     sides = [f"{effect}.{side.name}" for side in parameters if side.role == "side"]
 
     def at(start: Start, share: float) -> Start:
-        lower = any(start.held[side] < 0.0 for side in sides)
+        lower = any(start.fixed[side] < 0.0 for side in sides)
         there = float(np.quantile(reached, 1.0 - share if lower else share))
         return replace(start, free=start.free | {f"{effect}.{place.name}": there})
 
@@ -493,7 +493,7 @@ def _restrictions_like(
 
 def _shows(start: Start, block: Block) -> bool:
     """True where an effect acts in a block with the choices that a start holds."""
-    values = start.free | start.held
+    values = start.free | start.fixed
     parameters = [
         p for p in start.effect.info.form(start.form).parameters if block.kind in p.needed_in
     ]
@@ -527,7 +527,7 @@ def _find_thresholds(
         return replace(
             start,
             free={n: v for n, v in start.free.items() if n not in thresholds},
-            held=start.held | thresholds,
+            fixed=start.fixed | thresholds,
         )
 
     levels = [low + (k + 0.5) * step for k in range(_THRESHOLD_LEVELS)]

@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._arrays import Array, Mask
-from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, residuals, stacked, with_priors
-from pamrs.diagnosis.noise import NoiseLevel, correlation_time
+from pamrs.diagnosis.noise import NoiseLevel, correlation_time, inflation_of
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import (
     CLOSURE_OF,
@@ -97,7 +96,7 @@ def find_closure(
     share one memory time and one memory angle, which the fit then refines. A term is taken while
     the logarithm of the misfit falls by more than its price, counted on independent samples of what
     is left, and while recordings left out are predicted better with it (with one recording only the
-    price decides). The choice is made a second time at the fit, residuals weighted by the
+    price decides). The choice is made a second time at the fit, residuals inflated by the
     autocorrelation that they have there, and the best of the fits and the baseline is kept. This
     takes ten to fifteen evaluations of the problem.
 
@@ -138,28 +137,32 @@ def find_closure(
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
-    chosen = _select(
+    first_choice = _select(
         _StackedFit.of(problem, baseline, baseline, inflation), candidates, columns, {}
     )
     first = (
-        None if chosen is None else _fit_terms(problem, nominal, baseline, inflation, chosen, say)
+        None
+        if first_choice is None
+        else _fit_terms(problem, nominal, baseline, inflation, first_choice, say)
     )
     if first is None:
         return None
-    autocorrelation = autocorrelation_of(problem, first, noise_level or {})
+    inflation_left = inflation_of(problem, first, noise_level or {})
     candidates, columns, warm = _at_first_fit(
-        problem, baseline, first, autocorrelation, blocks, closures
+        problem, baseline, first, inflation_left, blocks, closures
     )
-    second = _select(
-        _StackedFit.of(problem, warm, first, autocorrelation), candidates, columns, first.values
+    second_choice = _select(
+        _StackedFit.of(problem, warm, first, inflation_left), candidates, columns, first.values
     )
     other = (
-        None if second is None else _fit_terms(problem, nominal, warm, autocorrelation, second, say)
+        None
+        if second_choice is None
+        else _fit_terms(problem, nominal, warm, inflation_left, second_choice, say)
     )
     return _best_model(
         [baseline, first, *([] if other is None else [other])],
         problem,
-        autocorrelation,
+        inflation_left,
         len(candidates),
     )
 
@@ -173,11 +176,6 @@ def _closures(blocks: Sequence[Block]) -> dict[str, str]:
             f"blocks = {unknown} is not allowed: one or more of {', '.join(CLOSURE_OF)}"
         )
     return {name: closure for name, closure in closures.items() if closure is not None}
-
-
-def _shapes(closure: str) -> dict[str, tuple[float, ...]]:
-    """Values of each memory shape of a closure that are tried."""
-    return {p.name: p.starts for p in EFFECTS[closure].parameters if p.neutral is None}
 
 
 def _columns(
@@ -211,7 +209,10 @@ def _at_zero(
     """Every term at every shape of its memory, and what each does to the stacked residuals per unit
     of its coefficient (n, m).
     """
-    shapes_tried = {closure: _shapes(closure) for closure in closures.values()}
+    shapes_tried = {
+        closure: {p.name: p.starts for p in EFFECTS[closure].parameters if p.neutral is None}
+        for closure in closures.values()
+    }
     rounds = max(len(values) for shapes in shapes_tried.values() for values in shapes.values())
     candidates: list[_ShapedTerm] = []
     columns = []
@@ -419,27 +420,27 @@ def _select(
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
     crossed = _LeaveOneOut.of(frame, rows, unit)
-    chosen = _Selection(candidates, target, wide, _LEAST_POWER)
+    selection = _Selection(candidates, target, wide, _LEAST_POWER)
     for k, candidate in enumerate(candidates):
-        if candidate.name in present and usable[k] and chosen.power(k) > _LEAST_POWER:
-            chosen.take(k)
-    order = chosen.order
-    taken, misfit, proof = len(order), chosen.misfit, crossed.left_out(order)
-    samples = frame.independent(chosen.left[: rows.size])
+        if candidate.name in present and usable[k] and selection.power(k) > _LEAST_POWER:
+            selection.take(k)
+    order = selection.order
+    count, misfit, proof = len(order), selection.misfit, crossed.left_out(order)
+    samples = frame.independent(selection.rows_left[: rows.size])
     while len(order) < _MOST_TERMS:
-        telling = chosen.most_telling(usable)
+        telling = selection.most_telling(usable)
         if telling is None:
             break
-        chosen.take(telling)
-        now, outside = chosen.misfit, crossed.left_out(order)
-        here = frame.independent(chosen.left[: rows.size])
-        inner = here * math.log(misfit / max(now, 1e-300))
-        outer = here * math.log(proof / max(outside, 1e-300))
-        new = len(order) - taken
+        selection.take(telling)
+        now, proof_now = selection.misfit, crossed.left_out(order)
+        here = frame.independent(selection.rows_left[: rows.size])
+        gain = here * math.log(misfit / max(now, 1e-300))
+        proven = here * math.log(proof / max(proof_now, 1e-300))
+        new = len(order) - count
         price = new * _price(here, len(candidates))
-        if outer > 0.0 and (inner > price or (outer > price and inner > new * math.log(here))):
-            taken, misfit, proof, samples = len(order), now, outside, here
-    pruned = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
+        if proven > 0.0 and (gain > price or (proven > price and gain > new * math.log(here))):
+            count, misfit, proof, samples = len(order), now, proof_now, here
+    pruned = _pruned(target, wide, order[:count], misfit, samples, _price(samples, len(candidates)))
     return _solved(frame, candidates, rows, unit, size, pruned) if pruned else None
 
 
@@ -451,7 +452,7 @@ class _Selection:
     def __init__(
         self, candidates: list[_ShapedTerm], target: Array, wide: Array, least_power: float
     ) -> None:
-        self.left, self._free = target.copy(), wide.copy()
+        self.rows_left, self._free = target.copy(), wide.copy()
         self.order: list[int] = []
         self._candidates, self._least_power = candidates, least_power
         self._shapes: dict[str, float | None] = {}
@@ -459,7 +460,7 @@ class _Selection:
     @property
     def misfit(self) -> float:
         """Sum of squares that is left."""
-        return float(self.left @ self.left)
+        return float(self.rows_left @ self.rows_left)
 
     def power(self, k: int) -> float:
         """Squared length of a term's part that the terms taken before do not explain."""
@@ -472,7 +473,7 @@ class _Selection:
         if candidate.memory:
             self._shapes.setdefault(candidate.memory, candidate.shape)
         direction = self._free[:, k] / max(float(np.linalg.norm(self._free[:, k])), 1e-150)
-        self.left = self.left - direction * float(direction @ self.left)
+        self.rows_left = self.rows_left - direction * float(direction @ self.rows_left)
         self._free = self._free - np.outer(direction, direction @ self._free)
 
     def most_telling(self, usable: Mask) -> int | None:
@@ -488,7 +489,7 @@ class _Selection:
         open_[self.order] = False
         if not open_.any():
             return None
-        explained = (self._free.T @ self.left) ** 2 / np.where(open_, power, 1.0)
+        explained = (self._free.T @ self.rows_left) ** 2 / np.where(open_, power, 1.0)
         return int(np.argmax(np.where(open_, explained, -1.0)))
 
 
@@ -596,7 +597,7 @@ def _fit_terms(
     """
     effects = tuple(dict.fromkeys(filter(None, map(effect_of, chosen.values))))
     every = {f"{e}.{p.name}": p for e in effects for p in e.info.parameters}
-    held = {
+    fixed = {
         n: 0.0 if p.neutral == 0.0 else p.default
         for n, p in every.items()
         if n not in chosen.values and n not in chosen.shapes
@@ -618,7 +619,7 @@ def _fit_terms(
                 effects,
                 starts,
                 inflation,
-                fixed=held,
+                fixed=fixed,
                 warm=replace(warm, values=shifted),
                 evaluations=evaluations,
             )

@@ -11,9 +11,9 @@ from pamrs.effects import Hypothesis, Term
 
 def fit_considered(search: Search) -> list[FittedHypothesis]:
     """Fit what of each hypothesis that the caller asks for acts in the blocks of a mismatch."""
-    trial, fitted = search.trial, list[FittedHypothesis]()
-    for hypothesis in trial.inner.considered:
-        acting = [t for t in hypothesis.terms if any(concerns(t, b) for b in trial.suspects)]
+    attempts, fitted = search.attempts, list[FittedHypothesis]()
+    for hypothesis in attempts.fit_problem.considered:
+        acting = [t for t in hypothesis.terms if any(concerns(t, b) for b in attempts.suspects)]
         # what may happen at times of its own is looked for beside what lasts
         effects = sorted(
             (t for t in acting if t.is_effect),
@@ -23,7 +23,7 @@ def fit_considered(search: Search) -> list[FittedHypothesis]:
         if not effects and not wrong:
             continue
         search.tell(f"trying {Hypothesis((*effects, *map(Term, wrong)))}, which was asked for")
-        best = search.start if not wrong else trial.fit_freed(wrong, search.start.fit)
+        best = search.start if not wrong else attempts.fit_freed(wrong, search.start.fit)
         for effect in effects:
             best = None if best is None else _add_effect(search, best, effect)
         fitted += [] if best is None else [best]
@@ -32,21 +32,21 @@ def fit_considered(search: Search) -> list[FittedHypothesis]:
 
 def _add_effect(search: Search, beside: FittedHypothesis, effect: Term) -> FittedHypothesis | None:
     """Add an effect to a set, from the start of each form that leaves least in a few steps."""
-    info, trial = effect.info, search.trial
+    info, attempts = effect.info, search.attempts
     if beside.fit.events is not None:
         return None  # beside events nothing else is fitted
     if not info.lasting:
-        return trial.fit_events(effect if info.own else Term(effect.id), beside)
-    starts = trial.starts_of(beside)
+        return attempts.fit_events(effect if info.own else Term(effect.id), beside)
+    starts = attempts.starts_of(beside)
     short: dict[str, list[FittedHypothesis]] = {}
     for one in _possible_starts(search, beside, effect):
-        candidate = trial.fit_shortly([*starts, one], beside.fit, beside.wrong)
+        candidate = attempts.fit_shortly([*starts, one], beside.fit, beside.wrong)
         if candidate is not None:
             short.setdefault(one.form, []).append(candidate)
     near = (max(candidate, key=search.weight) for candidate in short.values())
-    ended = [trial.fit_together(trial.starts_of(best), best.fit, best.wrong) for best in near]
+    ended = [attempts.fit_together(attempts.starts_of(best), best.fit, best.wrong) for best in near]
     if info.transient:
-        ended.append(trial.fit_events(Term(effect.id), beside))
+        ended.append(attempts.fit_events(Term(effect.id), beside))
     return max((c for c in ended if c is not None), key=search.weight, default=None)
 
 
@@ -55,7 +55,7 @@ def _possible_starts(search: Search, beside: FittedHypothesis, effect: Term) -> 
     contact, and those of the catalogue in several sizes.
     """
     _, ranked = search.rank(beside)
-    usual = starts_of(effect, sealed=search.trial.nominal.model["valve"] is None)
+    usual = starts_of(effect, sealed=search.attempts.nominal.model["valve"] is None)
     return [
         *(score.start.scaled(score.size) for score in ranked.get(effect, [])),
         *(

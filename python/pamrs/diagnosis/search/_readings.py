@@ -23,15 +23,8 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.channels import block_of, channel_of, unit_of
-from pamrs.diagnosis.fit import (
-    Fit,
-    Problem,
-    free_baseline,
-    known_parameters,
-    residuals,
-    stacked,
-)
-from pamrs.diagnosis.noise import correlation_time, excess, noise_levels
+from pamrs.diagnosis.fit import Fit, Problem, free_baseline, known_parameters, residuals, stacked
+from pamrs.diagnosis.noise import correlation_time, excess, no_inflation, noise_levels
 from pamrs.diagnosis.prepare import Prepared, Residual, implausible
 from pamrs.diagnosis.search._baseline import refitted, thorough
 from pamrs.errors import SimulationError
@@ -166,15 +159,14 @@ def find_misread(problem: Problem, nominal: Rig) -> Reading | None:
         nearly all of what it leaves.
     """
     every = list(_readings(problem, nominal))
-    settings = problem.settings
     small = [r for r in every if not r.offset and r.size < _SMALL_STEP]
     large = _worth_a_fit(problem, nominal, [r for r in every if r not in small])
     # what is no more than a gauge's slope may be off by tells nothing
-    small = [r for r in small if r.size >= _STDS * settings.gauge_error]
+    small = [r for r in small if r.size >= _STDS * problem.settings.gauge_error]
     if not (small or large):
         return None
     try:
-        was = refitted(problem, nominal, _white(problem))
+        was = refitted(problem, nominal, no_inflation(problem.blocks))
     except SimulationError:
         return None
     fitted = [_fit_reading(problem, nominal, was, reading) for reading in large]
@@ -205,7 +197,7 @@ def _fit_reading(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> 
     """A reading with its fit, where the recordings ask for it."""
     reread = reading.read(problem)
     try:
-        now = refitted(reread, nominal, _white(problem))
+        now = refitted(reread, nominal, no_inflation(problem.blocks))
     except SimulationError:
         return None
     before, after = _power(problem, was), _power(reread, now)
@@ -223,16 +215,15 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     than noise from bin to bin: asked is the sum of squares, priors included, as the parameters
     follow the factor. Beside physics that is missing it is not told.
     """
-    settings = problem.settings
     reread = reading.read(problem)
     beyond = replace(reading, factors=tuple(factor**2 for factor in reading.factors)).read(problem)
     try:
-        now = thorough(reread, nominal, _white(problem), was)
+        now = thorough(reread, nominal, no_inflation(problem.blocks), was)
         after = _power(reread, now)
         least = _CLEAR_STDS**2 * max(1.0, after)
         if 2.0 * (was.cost - now.cost) < least or not _is_noise(reread, now):
             return None
-        far = thorough(beyond, nominal, _white(problem), now)
+        far = thorough(beyond, nominal, no_inflation(problem.blocks), now)
     except SimulationError:
         return None
     # a parabola through none, the factor and its square, in steps of the factor
@@ -243,7 +234,7 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     std = math.sqrt(max(1.0, after) / (2.0 * bend))
     step = math.log(reading.factors[0])
     gain = math.exp(step * best)
-    clear = abs(gain - 1.0) >= _STDS * settings.gauge_error
+    clear = abs(gain - 1.0) >= _STDS * problem.settings.gauge_error
     if not clear or abs(best - 1.0) > _STDS * std:
         return None
     before = _power(problem, was)
@@ -259,10 +250,6 @@ def _is_noise(problem: Problem, fitted: Fit) -> bool:
         for b in problem.blocks
     ]
     return all(one.ratio <= one.limit for one in excesses)
-
-
-def _white(problem: Problem) -> dict[str, float]:
-    return {block.name: 1.0 for block in problem.blocks}
 
 
 def _power(problem: Problem, fitted: Fit) -> float:
@@ -285,7 +272,7 @@ def _linear(problem: Problem, rig: Rig, names: Sequence[str]) -> float:
     of its parameters inside their tolerances.
     """
     known = known_parameters(rig)
-    rows, slope = stacked(problem, residuals(problem, rig, names), _white(problem))
+    rows, slope = stacked(problem, residuals(problem, rig, names), no_inflation(problem.blocks))
     square = float(rows @ rows)
     if not math.isfinite(square):
         raise SimulationError("a residual is not finite")
@@ -302,7 +289,6 @@ def _free_is_listed(problem: Problem, fitted: Fit, reading: Reading) -> bool:
     """True where a free factor (or offset), fitted with the parameters, would be that of the list;
     the problem is that of the reading.
     """
-    settings = problem.settings
     step = _FREE_STEP * (abs(reading.offset) or 1.0)
     factor, offset = (1.0, step) if reading.offset else (1.0 + step, 0.0)
     moved = replace(reading, factors=(factor,) * len(reading.channels), offset=offset)
@@ -329,14 +315,13 @@ def _free_is_listed(problem: Problem, fitted: Fit, reading: Reading) -> bool:
     weight = design @ inverse[:, 0]
     coloured = float(np.sum((weight * rows) ** 2)) * correlation_time(rows)
     spread = _STDS * math.sqrt(max(0.0, inverse[0, 0], coloured))
-    exact = settings.gauge_error * (abs(reading.offset) or 1.0)
+    exact = problem.settings.gauge_error * (abs(reading.offset) or 1.0)
     return away <= max(exact, spread) and away + spread <= _CLOSER * reading.size
 
 
 def _possible(problem: Problem, nominal: Rig) -> bool:
     """True where recordings read in this way can be of the rig at all."""
-    plausible = problem.settings
-    return not any(implausible(p.recording, nominal, plausible) for p in problem.recordings)
+    return not any(implausible(p.recording, nominal, problem.settings) for p in problem.recordings)
 
 
 def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:

@@ -12,26 +12,18 @@ import numpy as np
 
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
-    Attempts,
+    LEAST_TEMPERING,
     FittedHypothesis,
     Weighing,
-    explains,
     log_weight,
-    possible_gain,
     share_left,
     significant,
 )
 from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
 from pamrs.diagnosis.noise import with_sizes
 from pamrs.diagnosis.prepare import Block
-from pamrs.diagnosis.screen import (
-    Score,
-    Screen,
-    Tangent,
-    best_of_each_kind,
-    by_effect,
-    tangent_of,
-)
+from pamrs.diagnosis.screen import Score, Screen, Tangent, best_of_each_kind, by_effect, tangent_of
+from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, far_parameters
 from pamrs.effects import Hypothesis, Term
 
@@ -62,7 +54,7 @@ class Search:
 
     Attributes
     ----------
-    trial : Attempts
+    attempts : Attempts
         Recordings, model, noise levels.
     screened : Screen
         Signatures of the effects.
@@ -74,7 +66,7 @@ class Search:
         Receives progress.
     """
 
-    trial: Attempts
+    attempts: Attempts
     screened: Screen
     start: FittedHypothesis
     weighing: Weighing
@@ -82,11 +74,15 @@ class Search:
 
     def weight(self, candidate: FittedHypothesis) -> float:
         """Logarithm of what a hypothesis weighs against others."""
-        return log_weight(candidate, self.start, self.trial.compared, self.weighing)
+        # that of `weigh` depends on the best hypothesis of all, which is not found yet: by a fixed
+        # one the order of those that are known stays as it is when others come
+        return log_weight(
+            candidate, self.start, self.attempts.compared, self.weighing, LEAST_TEMPERING
+        )
 
     def share_left(self, candidate: FittedHypothesis) -> float:
         """Share of the mismatch that a hypothesis leaves."""
-        return share_left(candidate, self.start, self.trial.compared)
+        return share_left(candidate, self.start, self.attempts.compared)
 
     def heaviest_first(self, candidates: Iterable[FittedHypothesis]) -> list[FittedHypothesis]:
         """Hypotheses in the order of their weight."""
@@ -96,14 +92,14 @@ class Search:
         """The tangent space of a set, and the starts of each effect by what they would take of what
         the set leaves.
         """
-        tangent = tangent_of(base.fit, self.trial.inner, self.trial.white)
+        tangent = tangent_of(base.fit, self.attempts.fit_problem, self.attempts.no_inflation)
         return tangent, by_effect(self.screened.scores(tangent, without=base.effects))
 
 
 def combine(
     search: Search,
     singles: list[FittedHypothesis],
-    mistaken: list[FittedHypothesis],
+    wrong_values: list[FittedHypothesis],
     transient: list[Term],
 ) -> list[FittedHypothesis]:
     """Sets of two hypotheses and more, where no single one settles the mismatch.
@@ -116,7 +112,7 @@ def combine(
     ----------
     search : Search
         What they are found with.
-    singles, mistaken : list of FittedHypothesis
+    singles, wrong_values : list of FittedHypothesis
         Single effects and values that are wrong, fitted by themselves.
     transient : list of Term
         Effects that happen at times of their own.
@@ -125,24 +121,24 @@ def combine(
     -------
     list of FittedHypothesis
     """
-    roots = search.heaviest_first(c for c in (*singles, *mistaken) if c.fit.events is None)
+    roots = search.heaviest_first(c for c in (*singles, *wrong_values) if c.fit.events is None)
     growing = _Growing(search, roots)
     sets = [s for root in roots[:MOST_PAIRED] for s in growing.widen(root)]
-    happening = []
+    with_events = []
     for effect, beside in _event_partners(search, singles, transient):
         search.tell(f"looking for {effect} with {beside.effects[0]}")
-        fitted = search.trial.fit_events(effect, beside)
-        happening += [] if fitted is None else [fitted]
-    return [*sets, *happening, *growing.grow(sets)]
+        fitted = search.attempts.fit_events(effect, beside)
+        with_events += [] if fitted is None else [fitted]
+    return [*sets, *with_events, *growing.grow(sets)]
 
 
 def with_freed_values(search: Search, single: FittedHypothesis) -> list[FittedHypothesis]:
     """Free the parameters that an effect moves far, one at a time, next to the effect."""
     fitted = []
-    for name in far_parameters(search.trial, single.fit):
+    for name in far_parameters(search.attempts, single.fit):
         search.tell(f"trying {single.hypothesis} with another {name}")
-        starts = search.trial.starts_of(single)
-        beside = search.trial.fit_together(starts, single.fit, (name,))
+        starts = search.attempts.starts_of(single)
+        beside = search.attempts.fit_together(starts, single.fit, (name,))
         fitted += [] if beside is None else [beside]
     return fitted
 
@@ -181,34 +177,34 @@ class _Growing:
         What they are found with.
     roots : list of FittedHypothesis
         Single effects and values that are wrong, fitted by themselves, those that weigh most first.
-    done : set of Hypothesis
-        Those that were fitted.
+    tried_sets : set of Hypothesis
+        Sets that were fitted.
     likely : list of _Partner
         What leaves least beside the single hypothesis that weighs most, which the others get too.
     """
 
     search: Search
     roots: list[FittedHypothesis]
-    done: set[Hypothesis] = field(default_factory=set)
+    tried_sets: set[Hypothesis] = field(default_factory=set)
     likely: list[_Partner] = field(default_factory=list)
 
     @property
-    def trial(self) -> Attempts:
+    def attempts(self) -> Attempts:
         """Recordings, model, noise levels."""
-        return self.search.trial
+        return self.search.attempts
 
     def grow(self, sets: list[FittedHypothesis]) -> list[FittedHypothesis]:
         """Grow the best set by one term after the other."""
         weight = self.search.weight
         best = max(sets, key=weight, default=None)
         grown: list[FittedHypothesis] = []
-        while best is not None and len(best.terms) < self.trial.settings.most_terms:
+        while best is not None and len(best.terms) < self.attempts.settings.most_terms:
             formed = self._in_best_forms(best, [*sets, *grown])
             grown += formed
             best = max(formed, key=weight)
             widened = self.widen(best)
             further = max(widened, key=weight, default=None)
-            if further is None or not _predicts_better(further, best, self.trial):
+            if further is None or not _predicts_better(further, best, self.attempts):
                 break
             grown += widened
             best = further
@@ -220,10 +216,10 @@ class _Growing:
         """A set with its effects in their best forms, and its rivals in the forms that it has then:
         which of them leaves least must not depend on whose forms were looked at.
         """
-        trial = self.trial
+        attempts = self.attempts
         best = in_best_forms(self.search, base)
         before, after = (
-            {e: trial.start_of(c.fit, e).kind for e in base.effects} for c in (base, best)
+            {e: attempts.start_of(c.fit, e).kind for e in base.effects} for c in (base, best)
         )
         mended = {e for e in base.effects if before[e] != after[e]}
         rivals = self.search.heaviest_first(
@@ -232,39 +228,39 @@ class _Growing:
 
         def formed(rival: FittedHypothesis) -> FittedHypothesis | None:
             starts = [
-                trial.start_of((best if e in mended else rival).fit, e) for e in rival.effects
+                attempts.start_of((best if e in mended else rival).fit, e) for e in rival.effects
             ]
-            return trial.fit_together(starts, rival.fit, rival.wrong)
+            return attempts.fit_together(starts, rival.fit, rival.wrong)
 
-        reformed = two_at_a_time(formed, rivals[: trial.settings.most_polished])
+        reformed = two_at_a_time(formed, rivals[: attempts.settings.most_polished])
         return [best, *(c for c in reformed if c is not None)]
 
     def widen(self, base: FittedHypothesis) -> list[FittedHypothesis]:
         """A set with each of its likely partners, fitted from where both are."""
-        starts = self.trial.starts_of(base)
+        starts = self.attempts.starts_of(base)
         partners = []
         for partner in self._partners(base, starts):
             if not self._was_tried(base, partner.terms):
-                self.done.add(Hypothesis((*base.terms, *partner.terms)))
+                self.tried_sets.add(Hypothesis((*base.terms, *partner.terms)))
                 self.search.tell(f"trying {Hypothesis((*base.terms, *partner.terms))}")
                 partners.append(partner)
 
         def fitted(partner: _Partner) -> FittedHypothesis | None:
             warm = replace(base.fit, values=base.fit.values | partner.values)
             wrong = (*base.wrong, *partner.wrong)
-            return self.trial.fit_together([*starts, *partner.starts], warm, wrong)
+            return self.attempts.fit_together([*starts, *partner.starts], warm, wrong)
 
         return [c for c in two_at_a_time(fitted, partners) if c is not None]
 
     def _was_tried(self, base: FittedHypothesis, terms: tuple[Term, ...]) -> bool:
         """True where a set was fitted with some further terms."""
-        return Hypothesis((*base.terms, *terms)) in self.done
+        return Hypothesis((*base.terms, *terms)) in self.tried_sets
 
     def _partners(self, base: FittedHypothesis, starts: list[Start]) -> Iterator[_Partner]:
         """Partners of a set: effects whose signature is in what it leaves, terms that explain much
         alone, and parameters that it moves far.
         """
-        if far_above_noise(self.trial, base):
+        if far_above_noise(self.attempts, base):
             alone = len(base.terms) == 1
             likely = (alone and self.likely) or self._shortlisted(base, starts)
             if alone:
@@ -277,7 +273,7 @@ class _Growing:
                 if not self._was_tried(base, (scores[0].effect,)):
                     yield self._begun_best(base, starts, scores)
         yield from self._telling(base)
-        strained = far_parameters(self.trial, base.fit) if base.effects else []
+        strained = far_parameters(self.attempts, base.fit) if base.effects else []
         yield from (_Partner([], (name,)) for name in strained if name not in base.wrong)
 
     def _shortlisted(self, base: FittedHypothesis, base_starts: list[Start]) -> list[_Partner]:
@@ -294,7 +290,7 @@ class _Growing:
         ]
         best: dict[Term, _Partner] = {}
         for candidate, start in self._shortly(base, base_starts, further):
-            begin = self.trial.start_of(candidate.fit, start.effect)
+            begin = self.attempts.start_of(candidate.fit, start.effect)
             best.setdefault(start.effect, _Partner([begin]))
         return list(best.values())[:_MOST_PARTNERS]
 
@@ -306,10 +302,10 @@ class _Growing:
         """
 
         def begin(start: Start) -> FittedHypothesis | None:
-            return self.trial.fit_shortly([*base_starts, start], base.fit, base.wrong)
+            return self.attempts.fit_shortly([*base_starts, start], base.fit, base.wrong)
 
-        attempts = zip(two_at_a_time(begin, starts), starts, strict=True)
-        fitted = [(c, start) for c, start in attempts if c is not None]
+        short = zip(two_at_a_time(begin, starts), starts, strict=True)
+        fitted = [(c, start) for c, start in short if c is not None]
         return sorted(fitted, key=lambda one: self.search.weight(one[0]), reverse=True)
 
     def _begun_best(
@@ -322,7 +318,7 @@ class _Growing:
 
     def _signatures(self, base: FittedHypothesis) -> list[list[Score]]:
         """The effects that would take most of what a set leaves, each from all its starts."""
-        trial = self.trial
+        attempts = self.attempts
         tangent, ranked = self.search.rank(base)
         alone = len(base.terms) == 1
         # what a term leaves is a mismatch of its own, however large what it takes is
@@ -331,11 +327,11 @@ class _Growing:
         best = _one_place_each(likely)[:_MOST_PARTNERS]
         # what is left in one block may be little beside what another one had: an effect of that
         # block alone is tested by itself
-        for block in _blocks_untouched(base, self.search.start, trial) if alone else []:
+        for block in _blocks_untouched(base, self.search.start, attempts) if alone else []:
             in_block = [
                 effect
                 for effect, scores in ranked.items()
-                if [b for b in trial.suspects if acts_in(effect, b)] == [block]
+                if [b for b in attempts.suspects if acts_in(effect, b)] == [block]
                 and scores[0].gain > LEAST_GAIN
             ]
             best += [effect for effect in in_block[:1] if effect not in best]
@@ -357,7 +353,7 @@ class _Growing:
         ]
         return [
             _Partner(
-                self.trial.starts_of(c),
+                self.attempts.starts_of(c),
                 c.wrong,
                 {name: c.fit.values[name] for name in c.wrong},
             )
@@ -374,18 +370,18 @@ def _one_place_each(terms: list[Term]) -> list[Term]:
 
 
 def _event_partners(
-    search: Search, singles: list[FittedHypothesis], happening: list[Term]
+    search: Search, singles: list[FittedHypothesis], transient: list[Term]
 ) -> list[tuple[Term, FittedHypothesis]]:
     """Effects with times of their own, each with a persistent one that may have acted as well.
 
     That is the persistent effect that weighs most, if it leaves much; and, of those that were
     fitted, the one whose signature is in what the events leave.
     """
-    trial, screened, start = search.trial, search.screened, search.start
+    attempts, screened, start = search.attempts, search.screened, search.start
     steady = [c for c in singles if c.fit.events is None]
     best = max(steady, key=search.weight, default=start)
     leaves_some = _TRANSIENT_BESIDE < search.share_left(best) < _MUCH_LEFT
-    pairs = [(e, best) for e in happening] if leaves_some else []
+    pairs = [(e, best) for e in transient] if leaves_some else []
     mismatch = float(screened.tangent.rows @ screened.tangent.rows)
     for single in singles:
         if single.fit.events is None or search.share_left(single) > _MUCH_LEFT:
@@ -400,7 +396,9 @@ def _event_partners(
         least = max(LEAST_GAIN, _PARTNER_SHARE * mismatch)
         shown = [
             s
-            for s in screened.scores(tangent_of(beside, trial.inner, trial.white))
+            for s in screened.scores(
+                tangent_of(beside, attempts.fit_problem, attempts.no_inflation)
+            )
             if s.gain > least
         ]
         partner = next((c for s in shown for c in steady if c.effects == (s.effect,)), None)
@@ -430,7 +428,7 @@ def in_best_forms(search: Search, base: FittedHypothesis) -> FittedHypothesis:
         return base
 
     def leaves_more() -> bool:
-        return any(significant(best.fitted[b.name]) for b in search.trial.suspects)
+        return any(significant(best.fit_excess[b.name]) for b in search.attempts.suspects)
 
     best = base
     ranked = by_effect(search.screened.scores()) if leaves_more() else {}
@@ -447,44 +445,47 @@ def _in_another_form(
     search: Search, base: FittedHypothesis, effect: Term, scores: list[Score]
 ) -> FittedHypothesis | None:
     """A set with one effect in another form, where one leaves clearly less."""
-    trial = search.trial
-    now = trial.start_of(base.fit, effect)
+    attempts = search.attempts
+    now = attempts.start_of(base.fit, effect)
     others = [
         score.start.scaled(score.size)
         for score in best_of_each_kind(scores)
-        if score.start.form != now.form or not score.start.held.items() <= now.held.items()
+        if score.start.form != now.form or not score.start.fixed.items() <= now.fixed.items()
     ]
     if not others:
         return None
     search.tell(f"trying other forms of {effect} in {base.hypothesis}")
-    rest = [trial.start_of(base.fit, e) for e in base.effects if e != effect]
+    rest = [attempts.start_of(base.fit, e) for e in base.effects if e != effect]
 
     def begin(start: Start) -> FittedHypothesis | None:
         # parameters that both forms have go on from where they are
         free = {n: base.fit.values.get(n, value) for n, value in start.free.items()}
         starts = [*rest, replace(start, free=free)]
-        return trial.fit_shortly(starts, base.fit, base.wrong)
+        return attempts.fit_shortly(starts, base.fit, base.wrong)
 
     short = [c for c in two_at_a_time(begin, others) if c is not None]
     best = min(short, key=lambda c: c.misfit, default=None)
     if best is None or best.misfit > base.misfit / NEAR_PLACE:
         return None
-    fitted = trial.fit_together(trial.starts_of(best), best.fit, base.wrong)
+    fitted = attempts.fit_together(attempts.starts_of(best), best.fit, base.wrong)
     if fitted is None or log_misfit(fitted) > log_misfit(base) - FORM_SHARE_ALIKE:
         return None
     return replace(fitted, gain=base.gain)
 
 
 def _blocks_untouched(
-    candidate: FittedHypothesis, start: FittedHypothesis, trial: Attempts
+    candidate: FittedHypothesis, start: FittedHypothesis, attempts: Attempts
 ) -> list[Block]:
     """Blocks in which a set leaves most of what was too much there, in recordings that were fitted
     or held out.
     """
-    stages = ((start.fitted, candidate.fitted), (start.held_out, candidate.held_out))
+    stages = (
+        (start.fit_excess, candidate.fit_excess),
+        (start.held_out_excess, candidate.held_out_excess),
+    )
     return [
         b
-        for b in trial.suspects
+        for b in attempts.suspects
         if any(
             significant(now[b.name])
             and now[b.name].ratio - 1.0 > _MUCH_LEFT * (was[b.name].ratio - 1.0)
@@ -493,13 +494,13 @@ def _blocks_untouched(
     ]
 
 
-def _predicts_better(further: FittedHypothesis, best: FittedHypothesis, trial: Attempts) -> bool:
+def _predicts_better(further: FittedHypothesis, best: FittedHypothesis, attempts: Attempts) -> bool:
     """True where a larger set takes a large share of what a smaller one leaves of held-out
     recordings, and more than the pieces of the recordings differ in it.
     """
     taken, left_before = [], 0.0
-    for block in trial.suspects:
-        before, after = (c.held_out[block.name].pieces for c in (best, further))
+    for block in attempts.suspects:
+        before, after = (c.held_out_excess[block.name].pieces for c in (best, further))
         taken += [n * (was - now) for (was, n), (now, _) in zip(before, after, strict=True)]
         left_before += sum(n * (was - 1.0) for was, n in before)
     if len(taken) < 2 or left_before <= 0.0:
@@ -509,37 +510,26 @@ def _predicts_better(further: FittedHypothesis, best: FittedHypothesis, trial: A
     return gained > _FURTHER_ERRORS * error and gained > FURTHER_SHARE * left_before
 
 
-def far_above_noise(trial: Attempts, candidate: FittedHypothesis) -> bool:
+def far_above_noise(attempts: Attempts, candidate: FittedHypothesis) -> bool:
     """True where so much more than noise is left that linear signatures say little."""
-    inside = candidate.fitted
-    if any(level.curves is not None for level in trial.noise_level.values()):
-        none = dict.fromkeys((b.name for b in trial.inner.blocks), 0.0)
-        bare = replace(trial, noise_level=with_sizes(trial.noise_level, none))
-        inside = {
-            b.name: bare.excess(b, trial.inner, candidate.fit.residuals) for b in trial.suspects
+    fit_excess = candidate.fit_excess
+    if any(level.curves is not None for level in attempts.noise_level.values()):
+        none = dict.fromkeys((b.name for b in attempts.fit_problem.blocks), 0.0)
+        bare = replace(attempts, noise_level=with_sizes(attempts.noise_level, none))
+        fit_excess = {
+            b.name: bare.excess(b, attempts.fit_problem, candidate.fit.residuals)
+            for b in attempts.suspects
         }
     return any(
         max(excess_by_block[b.name].ratio, excess_by_block[b.name].systematic ** 2) > _STRONG_RATIO
-        for b in trial.suspects
-        for excess_by_block in (inside, candidate.held_out)
+        for b in attempts.suspects
+        for excess_by_block in (fit_excess, candidate.held_out_excess)
     )
-
-
-def settles(candidate: FittedHypothesis, trial: Attempts, start: FittedHypothesis) -> bool:
-    """True where a hypothesis leaves only noise, so that no pair is called for."""
-    return explains(candidate, start, trial.compared)
-
-
-def cannot_gain(candidate: FittedHypothesis, trial: Attempts) -> bool:
-    """True where no further one-parameter effect could pay for itself."""
-    evidence = trial.settings
-    least = evidence.further_price + evidence.parameter_price
-    return possible_gain(candidate, trial.compared) < least
 
 
 def log_misfit(candidate: FittedHypothesis) -> float:
     """Logarithm of what a hypothesis leaves of each block, on fitted and on held-out recordings:
     by it the forms of an effect are compared.
     """
-    stages = (candidate.fitted, candidate.held_out)
+    stages = (candidate.fit_excess, candidate.held_out_excess)
     return sum(math.log(max(e.ratio, 1.0)) for stage in stages for e in stage.values())

@@ -16,13 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import (
-    WALL_TOLERANCES,
-    Attempts,
-    BlockGroup,
-    FittedHypothesis,
-    significant,
-)
+from pamrs.diagnosis.evidence import WALL_TOLERANCES, FittedHypothesis, significant
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -33,8 +27,7 @@ from pamrs.diagnosis.fit import (
     two_at_a_time,
 )
 from pamrs.diagnosis.prepare import Block
-from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import UNDECIDED
+from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.rig import Rig
 from pamrs.rig.schema import split_name
 
@@ -116,7 +109,7 @@ def _kind(name: str) -> str:
 
 
 def free_suspects(
-    trial: Attempts,
+    attempts: Attempts,
     baseline: Fit,
     first: Fit,
     say: Callable[[str], None],
@@ -131,7 +124,7 @@ def free_suspects(
 
     Parameters
     ----------
-    trial : Attempts
+    attempts : Attempts
         Recordings, model, noise levels.
     baseline : Fit
         The refitted baseline, with sensitivities.
@@ -143,34 +136,34 @@ def free_suspects(
         Of the sum of squares, below which a step is not worth it; 0 where the last few units of
         chi-square count.
     """
-    walls = trial.settings.most_tolerances
+    walls = attempts.settings.most_tolerances
     suspects = [
         names
-        for freed in (baseline, first)
-        for names in suspected_values(freed, trial.inner.blocks)
+        for fitted in (baseline, first)
+        for names in suspected_values(fitted, attempts.fit_problem.blocks)
     ]
-    gains = _worth_a_fit(trial, baseline, list(dict.fromkeys(suspects)), trial.white)
+    gains = _worth_a_fit(attempts, baseline, list(dict.fromkeys(suspects)), attempts.no_inflation)
     # the linear model says little of what is far away: each parameter is fitted, whatever its
     # predicted gain beside others
     least = _PAIR_SHARE * max(gains.values(), default=0.0)
     pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][
         :_MOST_PAIRS
     ]
-    freed = []
+    candidates = []
     sets = [names for names in gains if len(names) == 1 or names in pairs]
-    for names, candidate in _fit_freed(trial, sets, baseline, say, share).items():
+    for names, candidate in _fit_freed(attempts, sets, baseline, say, share).items():
         if candidate is not None and candidate.is_wrong(walls):
-            freed.append(replace(candidate, gain=gains[names]))
-    return freed
+            candidates.append(replace(candidate, gain=gains[names]))
+    return candidates
 
 
-def far_parameters(trial: Attempts, fitted: Fit) -> list[str]:
+def far_parameters(attempts: Attempts, fitted: Fit) -> list[str]:
     """Parameters that a fit with effects moved far, and whose freeing promises most by the linear
     model; the most promising first.
 
     Parameters
     ----------
-    trial : Attempts
+    attempts : Attempts
         Recordings, model, noise levels.
     fitted : Fit
         A fit with effects.
@@ -178,17 +171,17 @@ def far_parameters(trial: Attempts, fitted: Fit) -> list[str]:
     far: list[tuple[str, ...]] = [
         (name,) for name, moved in fitted.moved.items() if abs(moved) >= _FAR_TOLERANCES
     ]
-    gains = _worth_a_fit(trial, fitted, far, trial.autocorrelation(fitted))
+    gains = _worth_a_fit(attempts, fitted, far, attempts.inflation_of(fitted))
     return [name for (name,) in gains][:_MOST_BESIDE]
 
 
 def _worth_a_fit(
-    trial: Attempts, fitted: Fit, sets: list[tuple[str, ...]], inflation: dict[str, float]
+    attempts: Attempts, fitted: Fit, sets: list[tuple[str, ...]], inflation: dict[str, float]
 ) -> dict[tuple[str, ...], float]:
     """Sets of parameters whose freeing is worth a fit by the linear model, with their gain in
     chi-square, the largest first.
     """
-    gains = _predicted_gain(trial.inner, trial.nominal, fitted, sets, inflation)
+    gains = _predicted_gain(attempts.fit_problem, attempts.nominal, fitted, sets, inflation)
     return {
         n: gains[n]
         for n in sorted(gains, key=lambda n: -gains[n])
@@ -197,7 +190,7 @@ def _worth_a_fit(
 
 
 def _fit_freed(
-    trial: Attempts,
+    attempts: Attempts,
     sets: list[tuple[str, ...]],
     baseline: Fit,
     say: Callable[[str], None],
@@ -210,17 +203,17 @@ def _fit_freed(
     def to_the_end(
         several: list[tuple[str, ...]],
     ) -> dict[tuple[str, ...], FittedHypothesis | None]:
-        ended = two_at_a_time(lambda names: trial.fit_freed(names, baseline, share), several)
+        ended = two_at_a_time(lambda names: attempts.fit_freed(names, baseline, share), several)
         return dict(zip(several, ended, strict=True))
 
     if len(sets) <= _MOST_FINISHED:
         return to_the_end(sets)
     say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
-    attempts = zip(sets, two_at_a_time(trial.fit_freed_shortly, sets), strict=True)
-    short = {names: c for names, c in attempts if c is not None}
-    worth = [names for names in short if not _needless(names, short, trial)]
+    short_fits = zip(sets, two_at_a_time(attempts.fit_freed_shortly, sets), strict=True)
+    short = {names: c for names, c in short_fits if c is not None}
+    worth = [names for names in short if not _needless(names, short, attempts)]
     best = sorted(worth, key=lambda names: short[names].misfit)[:_MOST_FINISHED]
-    if best and not any(significant(e) for e in short[best[0]].fitted.values()):
+    if best and not any(significant(e) for e in short[best[0]].fit_excess.values()):
         # what leaves much more than one that leaves noise does not get there
         near = _NEAR_MISFIT * short[best[0]].misfit
         best = [names for names in best if short[names].misfit <= near]
@@ -228,7 +221,7 @@ def _fit_freed(
 
 
 def _needless(
-    names: tuple[str, ...], short: Mapping[tuple[str, ...], FittedHypothesis], trial: Attempts
+    names: tuple[str, ...], short: Mapping[tuple[str, ...], FittedHypothesis], attempts: Attempts
 ) -> bool:
     """True where one of several parameters, freed alone, leaves nearly as little."""
     alone = [short[name,].misfit for name in names if (name,) in short] if len(names) > 1 else []
@@ -283,41 +276,3 @@ def _predicted_gain(
 
     was = cost(())
     return {loose: was - cost(loose) for loose in suspects}
-
-
-def price_of_wrong(candidate: FittedHypothesis, settings: DiagnosisSettings) -> float:
-    """Logarithm of what wrong values cost where the baseline explains all: a file that is further
-    outside its tolerances is rarer, but less and less so.
-    """
-    outside = candidate.outside(settings.most_tolerances)
-    return settings.file_log_odds * len(candidate.wrong) + outside
-
-
-def weigh_only_noise(quiet: BlockGroup, prices: Mapping[FittedHypothesis, float]) -> BlockGroup:
-    """A group whose baseline leaves only noise, with further hypotheses and the logarithm of what
-    each costs; those that leave more than noise, or predict worse, are left out.
-    """
-    start = quiet.candidates[0]
-    scores = {
-        c: _plausibility(c) - _plausibility(start) - price
-        for c, price in prices.items()
-        if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)
-    }
-    top, undecided = max(0.0, *scores.values(), 0.0), quiet.probabilities[UNDECIDED]
-    weights = {c.hypothesis: undecided * math.exp(score - top) for c, score in scores.items()}
-    before = {h: p * math.exp(-top) for h, p in quiet.probabilities.items()}
-    total = sum(weights.values()) + sum(before.values())
-    probabilities = {h: w / total for h, w in (before | weights).items()}
-    return replace(quiet, candidates=[*quiet.candidates, *scores], probabilities=probabilities)
-
-
-def _plausibility(candidate: FittedHypothesis) -> float:
-    """Logarithm of how probable a hypothesis makes the recordings, and its own values."""
-    evidence = sum(likelihood.most for likelihood in candidate.likelihood().values())
-    return evidence - 0.5 * (candidate.fit.strain + candidate.fit.start_strain)
-
-
-def _carries_over(candidate: FittedHypothesis, start: FittedHypothesis) -> bool:
-    """True where held-out recordings are predicted as well as by the baseline, or to noise."""
-    pairs = [(candidate.held_out[name], was) for name, was in start.held_out.items()]
-    return all(now.ratio <= max(now.limit, was.ratio) for now, was in pairs)

@@ -10,8 +10,15 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.fit import Fit, Problem, fit, predicted_with_doubt, residuals, stacked
-from pamrs.diagnosis.screen import predicted_by_others
+from pamrs.diagnosis.fit import (
+    Fit,
+    Problem,
+    fit,
+    predicted_by_others,
+    predicted_with_doubt,
+    residuals,
+    stacked,
+)
 from pamrs.recordings import Recording
 from tests.diagnosis.asked import diagnosed, problem_of
 from tests.diagnosis.held import hold as held_chamber

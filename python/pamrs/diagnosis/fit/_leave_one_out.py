@@ -10,7 +10,15 @@ from dataclasses import replace
 import numpy as np
 
 from pamrs._arrays import Array
-from pamrs.diagnosis.fit import FIT_BIN_TIME, Fit, Key, Problem, bin_width, residuals, stacked
+from pamrs.diagnosis.fit._fitting import (
+    FIT_BIN_TIME,
+    Fit,
+    Key,
+    Problem,
+    bin_width,
+    residuals,
+    stacked,
+)
 from pamrs.diagnosis.prepare import Residual
 
 # share of a direction that one recording alone tells (leverage, Cook & Weisberg 1982)
