@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.prepare import prepare
-from pamrs.diagnosis.ready import questions
+from pamrs.diagnosis.prepare import prepare, questions
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import RecordingError
 from pamrs.recordings import LogProposal, load_recordings, propose

@@ -8,8 +8,8 @@ Public: `Problem`, `Fit`, `Scaling`, `Weights`,
 `form_in`, `entry_of`, `with_effects_of`, `with_entry`, `without_term` (effects of a rig
 and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
-`depends`, `fits`, `places_of`, `same_data_in` (where effects act); `holdable`,
-`without_passing`, `known_parameters`, `with_known` (effects that the nominal model holds, and what
+`depends`, `fits`, `places_of`, `same_data_in` (where effects act);
+`known_parameters`, `with_known` (effects that the nominal model holds, and what
 is known of all parameters); `ends_in_tolerances`,
 `moved_value` (how far they may move); `spread_over_pieces`
 (standard deviations of coloured residuals).
@@ -48,11 +48,9 @@ from pamrs.diagnosis.fit._fitting import (
 )
 from pamrs.diagnosis.fit._known_parameters import (
     ends_in_tolerances,
-    holdable,
     known_parameters,
     moved_value,
     with_known,
-    without_passing,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._offsets import with_offsets
@@ -98,7 +96,6 @@ __all__ = [
     "fits",
     "form_in",
     "free_baseline",
-    "holdable",
     "known_parameters",
     "levenberg_marquardt",
     "look_for_events",
@@ -116,6 +113,5 @@ __all__ = [
     "with_known",
     "with_offsets",
     "with_priors",
-    "without_passing",
     "without_term",
 ]
