@@ -104,6 +104,8 @@ class Check:
         all evidence of that kind is listed when a case is refused.
     prepared : bool
         True where recordings that are ready to be fitted are needed.
+    repeats : Action
+        Sentences of checks with this action stand below a refusal: they may explain it.
     """
 
     name: str
@@ -113,6 +115,7 @@ class Check:
     look: Look
     of_rig: bool = False
     prepared: bool = False
+    repeats: Action = Action.DOUBT
 
 
 def _each(evidence: Callable[[Recording, Rig, DiagnosisSettings], Iterable[str]]) -> Look:
@@ -355,6 +358,7 @@ CHECKS: Final = (
         "Do they surround a block of the rig?",
         Action.REFUSE,
         _open,
+        repeats=Action.LEAVE_OUT,
     ),
     Check(
         "sense of motion",
@@ -445,7 +449,7 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
                 said[action] += found.texts
                 faulty += found.faulty
     except DiagnosisError as error:
-        raise DiagnosisError("\n".join([str(error), *said[Action.DOUBT], *left])) from error
+        raise DiagnosisError("\n".join([str(error), *said[checks[0].repeats]])) from error
     blocks = blocks_with_tanks(case.rig, case.channels)
     return Ready(
         case,
