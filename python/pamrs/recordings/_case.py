@@ -231,7 +231,7 @@ def is_table(thing: Any) -> bool:
     return isinstance(thing, Mapping) or hasattr(thing, "columns")
 
 
-def arrays_of(
+def _arrays_of(
     recordings: Mapping[str, Any],
     held_out: Sequence[str],
     units: Mapping[str, str],
@@ -239,22 +239,6 @@ def arrays_of(
 ) -> dict[str, Arrays]:
     """Arrays by recording and channel, ``time`` among them where a table has one, as a channel, an
     index or a coordinate.
-
-    Parameters
-    ----------
-    recordings : mapping of str to mapping
-        Dicts of arrays, DataFrames or Datasets.
-    held_out : sequence of str
-        Recordings that are not fitted.
-    units : mapping of str to str
-        Units by channel.
-    sample_time : float, optional
-        Spacing of the recordings without times.
-
-    Raises
-    ------
-    CaseError
-        Naming every recording or channel that is wrong, and what is allowed.
     """
     if not isinstance(recordings, Mapping) or not recordings:
         raise CaseError(
@@ -532,7 +516,7 @@ class Case(View):
                 f"rig = {as_said(rig)} is not allowed: a Rig is needed, as of pamrs.load_rig"
             )
         written = dict(units or {})
-        tables = arrays_of(recordings, held_out, written, sample_time)
+        tables = _arrays_of(recordings, held_out, written, sample_time)
         spacing = None if sample_time is None else check_sample_time(rig, sample_time)
         made = list[Recording]()
         for called, (table, own_units) in tables.items():

@@ -135,7 +135,7 @@ def sampled(name: str, values: Array, clock: Ticks, unit: str, hold: bool = Fals
     return Sampled(name, values[places], time, unit, hold, clock, places, tuple(remarks))
 
 
-def recording_of(
+def _recording_of(
     name: str,
     role: str,
     channels: Sequence[Sampled],
@@ -143,36 +143,13 @@ def recording_of(
     sample_time: float | None,
     said: Mapping[str, str],
 ) -> Recording:
-    """A recording of channels, whether they share a clock or not.
-
-    Parameters
-    ----------
-    name, role : str
-        What it is called and for.
-    channels : sequence of Sampled
-        Its channels, one at least.
-    source : str
-        The file, for messages.
-    sample_time : float, optional
-        Spacing of the grid [s].
-    said : mapping of str to str
-        Unit of each channel in the file.
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    RecordingError
-        If a channel cannot be what it is called, or a clock does not rise.
-    """
+    """A recording of channels, whether they share a clock or not."""
     first = channels[0].time
     alike = all(
         channel.time is first or np.array_equal(channel.time, first) for channel in channels
     )
     if not alike or any(channel.hold for channel in channels):
-        return on_one_clock(name, role, channels, source, sample_time)
+        return _on_one_clock(name, role, channels, source, sample_time)
     raw = {channel.name: channel.values for channel in channels}
     units = {channel.name: channel.unit for channel in channels}
     return assemble(name, role, first, raw, units, source, sample_time, said)
@@ -244,32 +221,14 @@ class _Commanded(_Held):
         return np.where(mask, mean, np.nan), mask
 
 
-def on_one_clock(
+def _on_one_clock(
     name: str, role: str, channels: Sequence[Sampled], source: str, sample_time: float | None
 ) -> Recording:
     """A recording of channels with different clocks, where all of them were sampled.
 
-    Parameters
-    ----------
-    name, role : str
-        What it is called and for.
-    channels : sequence of Sampled
-        One at least that is not held.
-    source : str
-        The file, for messages.
-    sample_time : float, optional
-        Spacing of the grid [s]; by default that of the fastest measured channel (commands and
-        temperatures left out). On a coarser one a channel is averaged, on a finer one it is
-        interpolated between neighbours.
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    RecordingError
-        If a clock does not rise, or the channels were not sampled at the same time.
+    By default its grid is that of the fastest measured channel (commands and temperatures left
+    out). On a coarser one a channel is averaged, on a finer one it is interpolated between
+    neighbours.
     """
     stepped = [channel for channel in channels if not channel.hold]
     if not stepped:
@@ -407,25 +366,8 @@ class Part(NamedTuple):
     channels: list[Sampled]
 
 
-def read_split(split: Any, source: str) -> Cut | None:
-    """Read the key ``split`` of a recording.
-
-    Parameters
-    ----------
-    split : str or mapping, optional
-        ``"clock"``, ``{"gap": seconds}`` or ``{"column": name}``.
-    source : str
-        The file, for messages.
-
-    Returns
-    -------
-    Cut or None
-
-    Raises
-    ------
-    RecordingError
-        If it is none of these.
-    """
+def _read_split(split: Any, source: str) -> Cut | None:
+    """Cut that the key ``split`` of a recording says."""
     if split is None:
         return None
     if split == "clock":
@@ -690,7 +632,7 @@ def load_recordings(
     if not sources:
         raise RecordingError(f"{source}: every channel has a value; one of the log is needed")
     clock = read_clock(time, source)
-    cut = read_split(split, source)
+    cut = _read_split(split, source)
     content = log or read_log(file, form)
     called = name or stem_of(file)
     found = recordings_of(content, sources, clock, called, role, sample_time, cut, pieces)
@@ -805,7 +747,7 @@ def recordings_of(
     if cut is None:
         if pieces is not None:
             raise RecordingError(f"{source}: pieces = {list(pieces)!r} needs split")
-        made = [recording_of(name, role, channels, source, sample_time, said)]
+        made = [_recording_of(name, role, channels, source, sample_time, said)]
         return _with_remarks(made, log, channels, [])
     column = None
     if cut.column is not None:
@@ -814,7 +756,7 @@ def recordings_of(
         column = Split(series.values[ticks.rows], ticks, series.labels)
     found, left, remarks = parts(channels, cut, column, pieces, source)
     made = [
-        recording_of(f"{name}_{part.label}", role, part.channels, source, sample_time, said)
+        _recording_of(f"{name}_{part.label}", role, part.channels, source, sample_time, said)
         for part in found
     ]
     made = [replace(each, left=tuple(left)) for each in made]

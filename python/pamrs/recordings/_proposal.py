@@ -67,7 +67,7 @@ _QUANTITIES: Final = frozenset(
     for word in CHANNELS[channel].strong
 )
 _PLAYED: Final = with_trait("played")
-NOT_A_CHANNEL: Final = frozenset(
+_NOT_A_CHANNEL: Final = frozenset(
     ("rate", "velocity", "speed", "dot", "acc", "effort", "stamp", "sec", "nanosec", "seq", "id")
     + ("status", "flag", "error", "variance", "covariance")
 )
@@ -289,7 +289,7 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
         text = f"{series.name} {why}: give from and to, its calibration"
         return Open(name, series.name, usual, electric or (0.0, 1.0), text)
     called = f"{series.name} is called like {name}"
-    levels = switch_levels(series)
+    levels = _switch_levels(series)
     if channel in _COMMANDS and levels:
         text = (
             f"{called}, and is {levels}, a switch: give from = [0, 1] and to, what these stand for"
@@ -313,7 +313,7 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
     return Match(name, series, unit, absolute, assumed=why)
 
 
-def switch_levels(series: Series) -> str:
+def _switch_levels(series: Series) -> str:
     """Words for the two values of a switch; empty for a series that is none."""
     good = series.values[np.isfinite(series.values)]
     if understood_unit(series.unit) or not np.isin(good, (0.0, 1.0)).all():
@@ -402,7 +402,7 @@ def _like_weather(values: np.ndarray[Any, np.dtype[np.float64]], written: Writte
 
 def _called(series: Series, channel: str, words: set[str]) -> float:
     """Score of the name of a series for a channel; 0 where the name excludes the channel."""
-    if NOT_A_CHANNEL & words:
+    if _NOT_A_CHANNEL & words:
         return 0.0
     strong, weak = CHANNELS[channel].strong, CHANNELS[channel].weak
     role = _role(series)
@@ -455,7 +455,7 @@ def _lonely(
             row
             for row, series in enumerate(candidates)
             if (written := understood_unit(series.unit)) and _measures(written, channel)
-            if not NOT_A_CHANNEL & set(words_of(series.name))
+            if not _NOT_A_CHANNEL & set(words_of(series.name))
             and not _named_otherwise(series, channel)
         ]
         alone = column not in taken and rivals == [name] and len(rows) == 1
@@ -822,7 +822,7 @@ def _proposal(
     split, pieces, short = _split(log, stepped[0] if stepped else None)
     taken = {each.series.name for each in matches} | {each.series for each in left}
     taken |= {split["column"]} if isinstance(split, dict) and "column" in split else set()
-    known_otherwise = NOT_A_CHANNEL | CLOCK_WORDS
+    known_otherwise = _NOT_A_CHANNEL | CLOCK_WORDS
     unused = [
         series.name
         for series in candidates

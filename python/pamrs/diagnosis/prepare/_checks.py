@@ -343,7 +343,7 @@ CHECKS: Final = (
         "`temperature`",
         "Is it usable, and each sample new?",
         Action.TAKE_OUT,
-        _mended(lambda case, _: without_poor_thermometers(case.recordings, case.rig)),
+        _mended(lambda case, _: _without_poor_thermometers(case.recordings, case.rig)),
     ),
     Check(
         "usable samples",
@@ -934,7 +934,7 @@ _MOST_COUNTED = 6
 _LEAST_NEW_SHARE = 0.5
 
 
-def without_poor_thermometers(
+def _without_poor_thermometers(
     recordings: Sequence[Recording], rig: Rig
 ) -> tuple[list[Recording], list[str]]:
     """Recordings without the temperatures of gases that cannot be judged in each of them, and
@@ -942,13 +942,6 @@ def without_poor_thermometers(
 
     No block needs a thermometer: one that fails, or whose samples repeat or lie on straight lines
     between fewer ones, is left out. The noise of the latter would be taken for far less than it is.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        What there is.
-    rig : Rig
-        The model.
     """
     notes = []
     for name in thermometers_of(rig).values():

@@ -76,7 +76,7 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
     """
     places = range(len(recordings))
     kept_parts: dict[int, list[Recording]] = {}  # by place: one recording may be listed twice
-    notes, channels = list[str](), ChannelDeviations()
+    notes, channels = list[str](), _ChannelDeviations()
     for place in sorted(places, key=lambda k: recordings[k].role != "fit"):
         before = [one for parts in kept_parts.values() for one in parts]
         kept_parts[place], notes_of_one = _unshared_parts(recordings[place], before, channels)
@@ -85,7 +85,7 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
 
 
 def _unshared_parts(
-    recording: Recording, before: Sequence[Recording], channels: ChannelDeviations
+    recording: Recording, before: Sequence[Recording], channels: _ChannelDeviations
 ) -> tuple[list[Recording], list[str]]:
     """Parts of a recording that are not in others, and a sentence where these are not all of it."""
     for other in before:
@@ -126,7 +126,7 @@ def _unshared_stretches(
     recording: Recording,
     free: Sequence[tuple[float, float]],
     before: Sequence[Recording],
-    channels: ChannelDeviations,
+    channels: _ChannelDeviations,
 ) -> list[tuple[float, float]]:
     """Stretches that share nothing with any recording of another role, long enough for a proof."""
     least = max(_LEAST_LEFT, LEAST_SAMPLES * recording.sample_time)
@@ -155,7 +155,7 @@ def _name_of(recording: Recording) -> str:
 def overlap(
     one: Recording,
     other: Recording,
-    channels: ChannelDeviations | None = None,
+    channels: _ChannelDeviations | None = None,
 ) -> Overlap | None:
     """The stretch that two recordings share, noise included; None where there is none.
 
@@ -165,7 +165,7 @@ def overlap(
     ----------
     one, other : Recording
         In any order.
-    channels : ChannelDeviations, optional
+    channels : _ChannelDeviations, optional
         What was found of the recordings before.
 
     Returns
@@ -177,7 +177,7 @@ def overlap(
     slow, fast = (one, other) if one.sample_time >= other.sample_time else (other, one)
     if not names or slow.sample_time > _MOST_RATE_RATIO * fast.sample_time:
         return None
-    each = shared_rows(slow, fast, names, channels or ChannelDeviations())
+    each = _shared_rows(slow, fast, names, channels or _ChannelDeviations())
     clearest = max(each, key=lambda one: int(one.same.sum()), default=None)
     if clearest is None:
         return None
@@ -204,13 +204,13 @@ def overlap(
     return Overlap(in_one, in_other, share, _gaps(one.duration, runs, margin))
 
 
-def _in_other(way: Alignment, run: tuple[float, float]) -> tuple[float, float]:
+def _in_other(way: _Alignment, run: tuple[float, float]) -> tuple[float, float]:
     """Ends of a stretch in the other recording [s]."""
     first, last = (float(way.of(np.array(time))) for time in run)
     return min(first, last), max(first, last)
 
 
-def _shared_mask(alignment: SharedRows) -> Mask:
+def _shared_mask(alignment: _SharedRows) -> Mask:
     """Rows that two recordings share: those found to be the same, and all between them but for runs
     of three windows or more that differ.
     """
@@ -291,7 +291,7 @@ def is_set(name: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Alignment:
+class _Alignment:
     """Times of a recording's samples in another recording.
 
     Attributes
@@ -311,13 +311,13 @@ class Alignment:
         return self.rate * time + self.lag
 
 
-class SharedRows(NamedTuple):
+class _SharedRows(NamedTuple):
     """Rows of the slower of two recordings at an alignment: those that lie in the other one, those
     in which some channel's deviations are the same, and those in which all channels that show
     anything differ.
     """
 
-    alignment: Alignment
+    alignment: _Alignment
     inside: Mask
     same: Mask
     other: Mask
@@ -338,7 +338,7 @@ class _Deviations(NamedTuple):
         return _Deviations(self.values[rows], self.known[rows], self.deviations[rows], self.step)
 
 
-class ChannelDeviations:
+class _ChannelDeviations:
     """Channels of recordings with their deviations, each found once."""
 
     def __init__(self) -> None:
@@ -353,26 +353,13 @@ class ChannelDeviations:
         return {name: self._by_name[recording, name] for name in names}
 
 
-def shared_rows(
-    slow: Recording, fast: Recording, names: list[str], channels: ChannelDeviations
-) -> Iterator[SharedRows]:
-    """Every alignment at which deviations of some channel are the same.
+def _shared_rows(
+    slow: Recording, fast: Recording, names: list[str], channels: _ChannelDeviations
+) -> Iterator[_SharedRows]:
+    """Every alignment at which deviations of some channel of two recordings are the same.
 
     Of two recordings of a million samples each it takes some seconds, most of them for correlations
     over all lags; the search for another rate of the clock looks at the beginnings alone.
-
-    Parameters
-    ----------
-    slow, fast : Recording
-        By sample time.
-    names : list of str
-        Channels that both have measured.
-    channels : ChannelDeviations
-        What was found of recordings before.
-
-    Yields
-    ------
-    SharedRows
     """
     slow_channels, fast_channels = channels.of(slow, names), channels.of(fast, names)
     ratio = slow.sample_time / fast.sample_time
@@ -383,7 +370,7 @@ def shared_rows(
         phases = min(_PHASES, max(1, round(abs(rate) * ratio)))
         for mean in (False, True) if abs(rate) * ratio > 1.5 else (False,):
             for phase in range(phases):
-                at = Alignment(rate, start + phase * fast.sample_time, mean)
+                at = _Alignment(rate, start + phase * fast.sample_time, mean)
                 for alignment in _alignments_at(slow, fast, (slow_channels, fast_channels), at):
                     some = True
                     yield alignment
@@ -546,8 +533,8 @@ def _alignments_at(
     slow: Recording,
     fast: Recording,
     channels: tuple[dict[str, _Deviations], dict[str, _Deviations]],
-    alignment: Alignment,
-) -> Iterator[SharedRows]:
+    alignment: _Alignment,
+) -> Iterator[_SharedRows]:
     """Alignments of one rate at which some channel's deviations are those of the other one."""
     slow_channels, fast_channels = channels
     step = alignment.rate * slow.sample_time
@@ -575,8 +562,8 @@ def _alignments_at(
                 same[rows] |= a.known & b.known
             others[rows] |= unlike
         if same.sum() >= LEAST_SAMPLES:
-            here = Alignment(alignment.rate, alignment.lag + lag * step, alignment.mean)
-            yield SharedRows(here, inside, same, others & ~same)
+            here = _Alignment(alignment.rate, alignment.lag + lag * step, alignment.mean)
+            yield _SharedRows(here, inside, same, others & ~same)
 
 
 def _single(values: Array) -> NDArray[np.float32]:
@@ -681,7 +668,7 @@ def _between(
     fast: Recording,
     slow_channels: dict[str, _Deviations],
     other: dict[str, _Deviations],
-) -> Iterator[SharedRows]:
+) -> Iterator[_SharedRows]:
     """Samples of one run that were dealt out to two recordings: those of one lie at a whole
     fraction between those of the other one and differ by noise alone, and no command that is
     repeated made both.
@@ -695,7 +682,9 @@ def _between(
             continue
         inside = (slow.time + lag >= 0.0) & (slow.time + lag <= fast.duration)
         if inside.sum() >= LEAST_SAMPLES:
-            yield SharedRows(Alignment(1.0, lag), inside, inside, np.zeros(inside.size, dtype=bool))
+            yield _SharedRows(
+                _Alignment(1.0, lag), inside, inside, np.zeros(inside.size, dtype=bool)
+            )
             return
 
 

@@ -567,7 +567,7 @@ def _freed_of_starts(
     )
 
 
-def begins_at(gauge: str) -> str:
+def _begins_at(gauge: str) -> str:
     """Dotted name of the pressure at which the supply of a gauge begins."""
     return f"{qualified('supply', gauge.partition('.')[2])}.initial_pressure"
 
@@ -626,8 +626,10 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
     for tank in tanks:
         name = block_of(tank)
         full = qualified("supply", name)
-        own_pressure = prepared.recording.parameters.get(begins_at(tank))
-        first = rig.parameter(begins_at(tank)).value if own_pressure is None else own_pressure.value
+        own_pressure = prepared.recording.parameters.get(_begins_at(tank))
+        first = (
+            rig.parameter(_begins_at(tank)).value if own_pressure is None else own_pressure.value
+        )
         level = np.full(prepared.n, first)
         flat = replace(
             prepared.with_signals({tank: (level, np.zeros(prepared.n))}),
@@ -651,7 +653,7 @@ def notes_on_tanks(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepa
     """Sentences on tanks without a gauge: the blocks that their simulated pressure drives."""
     notes = []
     for tank in dict.fromkeys(name for block in blocks for name in block.floating):
-        name = begins_at(tank)
+        name = _begins_at(tank)
         own_pressures = [
             p.recording.parameters[name] for p in recordings if name in p.recording.parameters
         ]
@@ -749,7 +751,7 @@ def with_own_values(
         Channels of tanks without a gauge.
     """
     own_values = {n: v for n, v in prepared.recording.parameters.items() if v.error == "own"}
-    tank_of = {begins_at(tank): tank for tank in tanks if begins_at(tank) in own_values}
+    tank_of = {_begins_at(tank): tank for tank in tanks if _begins_at(tank) in own_values}
     free = [name for name in own_values if name in core.parameter_names]
     every = [*free, *tank_of]
     if not every:
@@ -818,7 +820,7 @@ def notes_on_own_values(recordings: Sequence[Prepared]) -> list[str]:
     """Values that recordings have of their own, in words, and how far they are from each other."""
     values_of: dict[str, dict[str, float]] = {}
     notes = []
-    simulated = {begins_at(tank) for p in recordings for tank in p.simulated}
+    simulated = {_begins_at(tank) for p in recordings for tank in p.simulated}
     for name, recording in {p.recording.name: p.recording for p in recordings}.items():
         for parameter, value in recording.parameters.items():
             if value.error == "own":

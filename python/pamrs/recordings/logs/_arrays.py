@@ -88,40 +88,20 @@ def read_numpy(path: Path, form: TextFormat) -> Log:
     found: list[Series] = []
     unread: dict[str, str] = {}
     if isinstance(content, np.ndarray):
-        found += series_of_matrix("", content, form.columns, unread, path)
+        found += _series_of_matrix("", content, form.columns, unread, path)
     else:
         with content:
             for name in content.files:
-                found += series_of_matrix(name, content[name], form.columns, unread, path)
+                found += _series_of_matrix(name, content[name], form.columns, unread, path)
     return collected(path, found, unread)
 
 
-def series_of_matrix(
+def _series_of_matrix(
     heading: str, array: Any, columns: tuple[str, ...] | None, unread: dict[str, str], path: Path
 ) -> list[Series]:
     """Series of one array: a vector, the columns of a matrix, the fields of records.
 
-    Parameters
-    ----------
-    heading : str
-        Its name, perhaps with a unit.
-    array : array-like
-        Of one or two axes; samples run along the longer one.
-    columns : tuple of str, optional
-        Names for the columns of a matrix.
-    unread : dict
-        Gets what is none of these, and why.
-    path : Path
-        The file, for messages.
-
-    Returns
-    -------
-    list of Series
-
-    Raises
-    ------
-    RecordingError
-        If `columns` does not fit the matrix.
+    Samples run along the longer axis; `unread` gets what is none of these, with the reason.
     """
     name, unit = split_heading(heading)
     values = np.asarray(array)
@@ -129,7 +109,7 @@ def series_of_matrix(
         found: list[Series] = []
         for part in values.dtype.names:
             inside = f"{heading}/{part}" if heading else part
-            found += series_of_matrix(inside, values[part], None, unread, path)
+            found += _series_of_matrix(inside, values[part], None, unread, path)
         return found
     values = np.squeeze(values)
     if values.ndim not in (1, 2) or values.size < 2:
@@ -196,12 +176,12 @@ def read_hdf(path: Path, form: TextFormat) -> Log:
             unread[name] = f"it has the shape {item.shape}, which is no table"
             return
         gate.admit_array(item.shape, item.dtype)
-        for made in series_of_matrix(name, item[()], form.columns, unread, path):
+        for made in _series_of_matrix(name, item[()], form.columns, unread, path):
             unit = made.unit or _unit(item)
             found.append(Series(made.name, made.values, unit, _clock(item, len(made.values))))
 
     with h5py.File(path, "r") as file:
-        unread |= leads_elsewhere(file)
+        unread |= _leads_elsewhere(file)
         for name, item in members(file):
             take(name, item)
     return collected(path, found, unread)
@@ -228,19 +208,8 @@ def _elsewhere(item: Any) -> str:
     return ""
 
 
-def leads_elsewhere(group: Any) -> Iterator[tuple[str, str]]:
-    """Find the links and data sets of a group, or below it, that lead to other files or may do so.
-
-    Parameters
-    ----------
-    group : h5py.Group
-        Links to other files are not followed. What has several names is looked at once.
-
-    Yields
-    ------
-    name, why : str
-        The path from `group`.
-    """
+def _leads_elsewhere(group: Any) -> Iterator[tuple[str, str]]:
+    """Links and data sets in a group that lead to other files, or may do so, and why."""
     import h5py
 
     for name, item in members(group):
@@ -359,7 +328,7 @@ def _check_own_numbers(path: Path) -> None:
         return
 
     with h5py.File(path, "r") as file:
-        for name, why in leads_elsewhere(file):
+        for name, why in _leads_elsewhere(file):
             raise RecordingError(f"{path}: {name}: {why}")
         gate = Gate(path)
         for _, item in members(file):
@@ -396,7 +365,7 @@ class _Reader:
             for index, item in enumerate(value.ravel()):
                 self.take(f"{name}/{_own_name(item) or index + 1}", _record(item), depth + 1)
         elif isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
-            self.found += series_of_matrix(name, value, self.columns, self.unread, self.path)
+            self.found += _series_of_matrix(name, value, self.columns, self.unread, self.path)
         elif hasattr(value, "columns") and hasattr(value, "iloc"):  # a table or a timetable
             self._frame(name, value)
         elif depth == 0:

@@ -405,7 +405,7 @@ def series_of_texts(name: str, texts: Sequence[str], unit: str = "") -> Series:
 
 
 #: Pairs of words that a switch or a valve has, the first of them at rest.
-SWITCHES: Final = (
+_SWITCHES: Final = (
     *(("off", "on"), ("false", "true"), ("closed", "open"), ("low", "high"), ("no", "yes")),
     *(("aus", "ein"), ("aus", "an"), ("zu", "auf"), ("nein", "ja"), ("geschlossen", "offen")),
 )
@@ -416,7 +416,7 @@ def switched(series: Series) -> Series:
     they are.
     """
     words = [label.lower() for label in series.labels]
-    for pair in SWITCHES:
+    for pair in _SWITCHES:
         if words and set(words) - NO_VALUE <= set(pair):
             levels = np.array([pair.index(w) if w in pair else np.nan for w in words])
             values = levels[series.values.astype(np.intp)]

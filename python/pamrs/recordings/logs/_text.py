@@ -117,15 +117,15 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
         remarks.append("exponents are written with D, as Fortran does: read")
     times: list[str] | None = None
     if form.delimiter is None:
-        apart = times_apart(lines, source)
+        apart = _times_apart(lines, source)
         if apart is not None:
             lost = len(lines) - len(apart[0])
             remarks += [f"lines without a time: {lost}, left out"] if lost else []
             times, lines = apart
-        labelled = labelled_rows(lines, times, source)
+        labelled = _labelled_rows(lines, times, source)
         if labelled is not None:
             rows = lines_of_rows(labelled[0])
-            return log_of_lines(path, rows, form, ".", [*remarks, *labelled[1]])
+            return _log_of_lines(path, rows, form, ".", [*remarks, *labelled[1]])
     kept = [line for line in lines if not line.lstrip().startswith(_COMMENTS)]
     dialect = dialect_of(kept, source, form.delimiter, form.decimal, form.thousands)
     if times is not None:
@@ -135,10 +135,10 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
         lines = text.splitlines()
     comments = _comments(lines, dialect)
     body = lines_of(text, dialect.delimiter, source, _COMMENTS)
-    return log_of_lines(path, body, form, dialect.decimal, remarks, comments)
+    return _log_of_lines(path, body, form, dialect.decimal, remarks, comments)
 
 
-def log_of_lines(
+def _log_of_lines(
     path: Path,
     body: Lines,
     form: TextFormat,
@@ -146,32 +146,7 @@ def log_of_lines(
     remarks: Sequence[str] = (),
     comments: Sequence[list[str]] = (),
 ) -> Log:
-    """The log of a table, with what stands above it.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    body : Lines
-        Its rows.
-    form : TextFormat
-        What is given of it.
-    decimal : str
-        Decimal mark.
-    remarks : sequence of str
-        What was said of it before.
-    comments : sequence of list of str
-        Cells of the comments above it, which may be headings.
-
-    Returns
-    -------
-    Log
-
-    Raises
-    ------
-    RecordingError
-        If it is no table of numbers.
-    """
+    """Log of a table, with what stands above it: cells of comments may be headings."""
     above = _headed(path, body, decimal, form, comments)
     rows = body.after(above.first)
     if len(rows.lines) < 2:
@@ -565,26 +540,8 @@ _PAIR: Final = re.compile(
 _MOST: Final = 0.8  # of the lines look so
 
 
-def times_apart(lines: Sequence[str], source: str) -> tuple[list[str], list[str]] | None:
-    """Split lines like ``10:16:51.123 -> 5.00,152057`` into the time and the rest.
-
-    Parameters
-    ----------
-    lines : sequence of str
-        All lines.
-    source : str
-        The file, for messages.
-
-    Returns
-    -------
-    times, rests : list of str
-        Of the lines that have a time; None where most have none.
-
-    Raises
-    ------
-    RecordingError
-        If lines are of several measurements, whose fields would be taken for one.
-    """
+def _times_apart(lines: Sequence[str], source: str) -> tuple[list[str], list[str]] | None:
+    """Times and rests of lines like ``10:16:51.123 -> 5.00,15``; None where most have no time."""
     middle = lines[len(lines) // 2 :][:100]
     for form in _APART:
         if sum(form.fullmatch(line) is not None for line in middle) < _MOST * max(len(middle), 1):
@@ -613,33 +570,14 @@ def _pairs(line: str) -> list[tuple[str, str, str]] | None:
     return found
 
 
-def labelled_rows(
+def _labelled_rows(
     lines: Sequence[str], times: Sequence[str] | None, source: str
 ) -> tuple[list[list[str]], list[str]] | None:
-    """Rows of lines like ``t:0.02,u:7.00,p:1.5 bar``.
+    """Headings and rows of lines like ``t:0.02,u:7.00,p:1.5 bar``, and what was left out; None for
+    lines of which most are not so.
 
-    Parameters
-    ----------
-    lines : sequence of str
-        All lines.
-    times : sequence of str, optional
-        What stood before the arrow of each; the first column then.
-    source : str
-        The file, for messages.
-
-    Returns
-    -------
-    rows : list of list of str
-        Headings, then rows, each of which ends where a label comes again; empty where a label is
-        missing.
-    remarks : list of str
-        What was left out.
-    None where most lines are not so.
-
-    Raises
-    ------
-    RecordingError
-        If a label has several units.
+    A row ends where a label comes again, and has an empty cell where one is missing. Times that
+    stood before an arrow in each line are the first column.
     """
     middle = lines[len(lines) // 2 :][:100]
     if sum(_pairs(line) is not None for line in middle) < _MOST * max(len(middle), 1):
@@ -703,7 +641,7 @@ def read_json(path: Path, form: TextFormat) -> Log:
         raise RecordingError(f"{path}: no table was found: neither a list of records nor columns")
     check_size(len(rows), sum(map(len, rows)), str(path), len(rows[0]))
     body = lines_of_rows([_json_text(each) for each in row] for row in rows)
-    return log_of_lines(path, body, form, ".", said)
+    return _log_of_lines(path, body, form, ".", said)
 
 
 def _loaded(path: Path, number: int, line: str) -> Any:
@@ -792,7 +730,7 @@ def read_sheets(path: Path, form: TextFormat) -> Log:
         rows, commas = _texts(cells)
         said = [f"numbers that are texts with a decimal comma: {commas}, read"] if commas else []
         try:
-            tables[name] = log_of_lines(path, lines_of_rows(rows), form, ".", said)
+            tables[name] = _log_of_lines(path, lines_of_rows(rows), form, ".", said)
         except RecordingError as error:
             unread[f"sheet {name}"] = str(error).removeprefix(f"{path}: ")
     found: list[Series] = []
