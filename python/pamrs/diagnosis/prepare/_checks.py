@@ -56,8 +56,10 @@ class Action(Enum):
     """Consequence of a check for a case, in words."""
 
     REFUSE = "the case is refused"
-    LEAVE_OUT = "the recording is left out where others are left"
-    LEAVE_OUT_OR_REFUSE = "the recording is left out, or the case refused where none would be left"
+    LEAVE_OUT = "the recording is left out, if others can be fitted"
+    LEAVE_OUT_OR_REFUSE = (
+        "the recording is left out; if no other can be fitted, the case is refused"
+    )
     TAKE_OUT = "the channel is left out"
     MASK = "the samples are masked"
     NO_PROOF = "what is a copy is left out"
@@ -120,8 +122,8 @@ class Check:
 
 def _each(evidence: Callable[[Recording, Rig, DiagnosisSettings], Iterable[str]]) -> Look:
     """Evidence of all recordings of a case from that of one; empty texts are none."""
-    return lambda case, own: Found(
-        [text for r in case.recordings for text in evidence(r, case.rig, own) if text]
+    return lambda case, settings: Found(
+        [text for r in case.recordings for text in evidence(r, case.rig, settings) if text]
     )
 
 
@@ -329,7 +331,7 @@ CHECKS: Final = (
         "pressures, `valve_command`, `supply_command`, `joint_angle`, `length`",
         "Can each sample be of the rig?",
         Action.MASK,
-        _mended(lambda case, own: without_impossible(case.recordings, case.rig, own)),
+        _mended(lambda case, limits: without_impossible(case.recordings, case.rig, limits)),
     ),
     Check(
         "copies",
@@ -350,7 +352,7 @@ CHECKS: Final = (
         "channels that the blocks need",
         "Is the recording long enough, and is enough of each channel usable?",
         Action.LEAVE_OUT,
-        _each(lambda r, rig, own: [unusable(r, rig, core_rig(rig), own)]),
+        _each(lambda r, rig, limits: [unusable(r, rig, core_rig(rig), limits)]),
     ),
     Check(
         "blocks",
