@@ -199,7 +199,7 @@ docs: build $(VENV)/.docs  ## the site, its tutorials run, to out/site/index.htm
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html -d out/docs-pages docs out/site
 	@echo "written: out/site/index.html"
 
-reference: build  ## the tables of docs/reference: commands, keys, channels, units, settings, files
+reference: build  ## the tables of the documents: commands, keys, channels, units, settings, files, checks
 	$(BIN)/python docs/_site/made_reference.py
 
 effects: build  ## a page of every effect of the catalogue, its fingerprint drawn by the simulator

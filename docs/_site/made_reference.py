@@ -1,6 +1,6 @@
-"""Tables of the reference, made from the package: commands, keys of rig files, channels, units,
-settings, files. Each stands in a page between two marks, and the page around it has the words;
-``make reference`` writes them anew.
+"""Tables of the documents, made from the package: commands, keys of rig files, channels, units,
+settings, files, checks of a case. Each stands in a page between two marks, and the page around it
+has the words; ``make reference`` writes them anew.
 """
 
 import dataclasses
@@ -128,6 +128,18 @@ def settings():
     yield from rows(["setting", "default", "unit", "what", "origin"], lines)
 
 
+def checks():
+    """Every check of a case before any fit, in its order."""
+    from pamrs.diagnosis.prepare import CHECKS
+
+    lines = [
+        (one.name, one.channels, one.question, one.action.value, "yes" * one.of_rig)
+        for one in CHECKS
+    ]
+    heads = ["check", "looks at", "question", "where the answer is no", "asked by `import --rig`"]
+    yield from rows(heads, lines)
+
+
 def case_keys():
     """Every key of ``case.toml``, by its table."""
     from pamrs.recordings import CASE_KEYS
@@ -177,13 +189,16 @@ MADE = {
     "made-units": units,
     "made-settings": settings,
     "made-case-keys": case_keys,
+    "made-checks": checks,
     "made-result-keys": result_keys,
 }
 
 
 def made_pages():
-    """Every page of the reference by its file, the parts between its marks made anew."""
-    for page in sorted(REFERENCE.glob("*.md")):
+    """Every page of the reference, and the one on checks, by its file, the parts between its marks
+    made anew.
+    """
+    for page in (*sorted(REFERENCE.glob("*.md")), REFERENCE.parent / "cases_checks.md"):
         text = page.read_text(encoding="utf-8")
         for name, made in MADE.items():
             first, last = f"<!-- {name} -->\n", f"<!-- end of {name} -->"

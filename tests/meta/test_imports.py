@@ -46,7 +46,6 @@ LAYERS = (
 STEPS = ("settings", "prepare", "fit", "noise", "missing", "screen", "evidence", "search", "model")
 STEPS_OF_A_DIAGNOSIS = (
     *STEPS,
-    "ready",
     "limits",
     "next_experiment",
     "result",

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pamrs.errors import RecordingError
 from pamrs.recordings import Recording, load_recording, load_recordings, propose
-from pamrs.recordings._stamps import ticks
+from pamrs.recordings._clock import ticks
 from tests.recordings.written import SHOULDER, case_of, write_json_messages
 
 Array = NDArray[np.float64]

@@ -14,12 +14,11 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.prepare import prepare
-from pamrs.diagnosis.ready import questions
+from pamrs.diagnosis.prepare import prepare, questions
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import RecordingError
 from pamrs.recordings import LogProposal, load_recordings, propose
-from pamrs.recordings._stamps import reading_rows
+from pamrs.recordings._clock import reading_rows
 from pamrs.recordings.logs import read_log
 from tests.recordings.test_dialects import DATA, DT, Array, N, date
 from tests.recordings.written import SHOULDER, case_of

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from pamrs.errors import MissingPackageError, RecordingError
 from pamrs.recordings import load_recording, load_recordings, propose
 from pamrs.recordings import logs as logs_package
-from pamrs.recordings.logs import TextFormat, _sheets, read_log
+from pamrs.recordings.logs import TextFormat, _text, read_log
 from tests.recordings.written import (
     CHANNELS,
     DT,
@@ -340,8 +340,8 @@ def test_sheets_with_dates_texts_and_several_tables(
     rows += [[when + timedelta(seconds=0.5 * i), f"{i},5"] for i in range(40)]
     other = [["t [s]", "x [mm]"], *([i, 2.0 * i] for i in range(40))]
     cells = {"a": rows, "b": other, "notes": [["stand 3"]]}
-    monkeypatch.setattr(_sheets, "_sheets", lambda path: cells)
-    log = _sheets.read_sheets(tmp_path / "run.xlsx", TextFormat())
+    monkeypatch.setattr(_text, "_sheets", lambda path: cells)
+    log = _text.read_sheets(tmp_path / "run.xlsx", TextFormat())
     assert list(log.series) == ["a/Zeit", "a/Druck", "b/t", "b/x"]
     np.testing.assert_allclose(log.find("Zeit").values, 0.5 * np.arange(40))
     np.testing.assert_allclose(log.find("Druck").values, np.arange(40) + 0.5)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.recordings import CHANNELS, Recording, load_recording, load_recordings
-from pamrs.recordings._faults import find_faults
+from pamrs.recordings._recording import find_faults
 from pamrs.recordings.table import TEXT
 
 Array = NDArray[np.float64]

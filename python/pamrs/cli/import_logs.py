@@ -63,7 +63,7 @@ def import_command(
     file = None if out is None else out / "case.toml"
     if file is not None:
         check_new(file)
-    from pamrs.diagnosis.ready import questions
+    from pamrs.diagnosis.prepare import questions
     from pamrs.diagnosis.settings import DiagnosisSettings
     from pamrs.recordings import propose
     from pamrs.recordings.logs import TextFormat, check_readable

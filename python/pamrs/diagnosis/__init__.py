@@ -37,22 +37,24 @@ from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
     Prepared,
+    Ready,
     Unjudged,
     averaged_to_need,
     blocks_with_tanks,
     check_sense,
+    left_out,
     notes_on_beginnings,
     notes_on_own_values,
     notes_on_slack,
     notes_on_tanks,
     prepare,
+    readied,
     tanks_without_gauge,
     unjudged_blocks,
     with_own_values,
     with_tanks,
     with_unjudged_starts,
 )
-from pamrs.diagnosis.ready import Ready, left_out, readied
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine, find_misread, reading_errors
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -245,7 +247,7 @@ def _answer_without_unfollowed(
     except Unfollowed as error:
         unfollowed = error
     why = f"the model cannot follow it ({unfollowed})"
-    case, notes = left_out(ready.case, lambda r: why * (r.name == unfollowed.recording))
+    case, notes = left_out(ready.case, {unfollowed.recording: why})
     if not notes:
         raise unfollowed
     rest = replace(ready, case=case, suspected=[*notes, *ready.suspected])

@@ -14,11 +14,13 @@ from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.fit._data import ForceMap
 from pamrs.fit._ways import series_ways
 from pamrs.recordings import Recording, load_recording
-from pamrs.recordings.calibration import KEYS, Calibration, read_calibration
-from pamrs.recordings.dialect import check_marks, decimal_of, dialect_of
 from pamrs.recordings.logs import read_log, table_of
+from pamrs.recordings.mapping import CALIBRATION_KEYS, Calibration, read_calibration
 from pamrs.recordings.table import (
     Table,
+    check_marks,
+    decimal_of,
+    dialect_of,
     has,
     is_text,
     read_table,
@@ -186,7 +188,7 @@ def _calibrated(
     headings = []
     for index, entry in enumerate(renamed(table, columns, source)):
         if isinstance(entry, Mapping):
-            unknown = [key for key in entry if key not in ("name", *KEYS)]
+            unknown = [key for key in entry if key not in ("name", *CALIBRATION_KEYS)]
             if unknown or not isinstance(entry.get("name"), str):
                 problems.append(
                     f"columns: {dict(entry)!r} is not allowed: name (a heading with its unit) with "

@@ -5,19 +5,16 @@ reads a case folder, :data:`CASE_KEYS` has the keys of its ``case.toml``;
 :func:`load_recordings` takes the log of a laboratory as it is, :func:`propose` says what of it is
 likely which channel, :func:`suspicions` which units physics contradicts.
 :mod:`pamrs.recordings.table` reads tables of numbers from files, :mod:`pamrs.recordings.logs` logs
-of every format, :mod:`pamrs.recordings.calibration` what their numbers stand for.
+of every format, :mod:`pamrs.recordings.mapping` what their numbers stand for.
 """
 
 from pamrs.channels import CHANNELS
-from pamrs.recordings._case import Case, load_case, model_and_case
-from pamrs.recordings._case_keys import CASE_KEYS
+from pamrs.recordings._case import Case, is_table, load_case, load_recording, model_and_case
 from pamrs.recordings._doubts import Suspicion, ambient_of, suspicions
 from pamrs.recordings._from_log import load_recordings
-from pamrs.recordings._headed import load_recording
-from pamrs.recordings._in_memory import is_table
-from pamrs.recordings._matching import channels_of
-from pamrs.recordings._proposal import LogProposal, Proposal, propose
+from pamrs.recordings._proposal import LogProposal, Proposal, channels_of, propose
 from pamrs.recordings._recording import Issue, OwnValue, Recording
+from pamrs.recordings.mapping import CASE_KEYS
 
 __all__ = [
     "CASE_KEYS",

@@ -1,26 +1,34 @@
-"""Cases: a folder with a rig and the recordings made on it."""
+"""Cases, folders with a rig and the recordings made on it; tables in memory; files whose headings
+say it all, ``muscle_pressure [bar]``.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import as_said, one_of, refused
+from pamrs._arrays import Array
+from pamrs._checks import as_said, is_quantity, misshapen, one_of, plain, refused
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
 from pamrs._views import COLOURS, Curve, Panels, View, over_time
-from pamrs.channels import channel_of, unit_of
+from pamrs.channels import CHANNELS, channel_of, unit_of
 from pamrs.declared import problems_of
 from pamrs.effects import find_parameter
-from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
-from pamrs.recordings._case_keys import (
+from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined, meant
+from pamrs.recordings._doubts import ambient_of, limits_of, unit_trouble
+from pamrs.recordings._from_log import check_asked, completed, load_recordings, recordings_of
+from pamrs.recordings._recording import Issue, OwnValue, Recording
+from pamrs.recordings.logs import Log, Series, TextFormat, check_readable, read_log, table_of
+from pamrs.recordings.mapping import (
     DIALECT,
     ENTRY,
     ERRORS,
@@ -28,15 +36,343 @@ from pamrs.recordings._case_keys import (
     LOG,
     OF_A_LOG,
     TOP,
+    Clock,
+    Source,
 )
-from pamrs.recordings._doubts import ambient_of, limits_of
-from pamrs.recordings._from_log import load_recordings
-from pamrs.recordings._headed import load_recording
-from pamrs.recordings._in_memory import arrays_of
-from pamrs.recordings._recording import Issue, OwnValue, Recording
-from pamrs.recordings.logs import Log, Series, TextFormat, check_readable, read_log
+from pamrs.recordings.table import (
+    Table,
+    check_marks,
+    is_text,
+    read_table,
+    renamed,
+    stem_of,
+    thousands_of,
+)
 from pamrs.rig import Parameter, Rig, check_sample_time, effect_parameter, load_rig
-from pamrs.units import to_si
+from pamrs.units import measured_from, to_si
+
+HEADING: Final = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
+
+
+def load_recording(
+    path: str | os.PathLike[str],
+    *,
+    columns: Sequence[str] | Mapping[str, str] | None = None,
+    delimiter: str = ",",
+    header: bool = True,
+    thousands: str | Mapping[str, str] | None = None,
+    sample_time: float | None = None,
+    decimal: str = ".",
+    name: str | None = None,
+    role: str = "fit",
+    ambient_pressure: float | None = None,
+) -> Recording:
+    """Read a recording, check it and lay it on a uniform grid.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.csv``, ``.tsv``, ``.txt``, ``.dat`` (each also ``.gz``), or any other log that
+        :func:`pamrs.recordings.logs.read_log` reads, such as ``.parquet``.
+    columns : sequence or mapping of str, optional
+        Headings ``"name [unit]"`` to use instead of the file's: one for each column in order, or a
+        mapping from the file's headings. An empty heading leaves the column out.
+    delimiter : str
+        What separates cells; ``" "`` means any run of blanks.
+    header : bool
+        Whether the first row holds headings.
+    thousands : str or mapping, optional
+        Mark between groups of digits, of all columns or by channel: ``{"time": "."}``.
+    sample_time : float, optional
+        Grid spacing [s]; without a time column, the spacing of the rows. Else the usual interval.
+    decimal : str
+        Decimal mark.
+    name, role : str
+        Name (default: the file's stem) and role, ``fit`` or ``held_out``.
+    ambient_pressure : float, optional
+        What is subtracted from absolute pressures (``bar(a)``) where the file has no channel
+        ``ambient_pressure`` [Pa]; by default that of the standard atmosphere.
+
+    Returns
+    -------
+    Recording
+        SI values with masks and issues.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read or a column cannot be understood; the message names file and
+        column.
+    """
+    file = Path(path)
+    source = str(file)
+    check_asked(source, role, sample_time)
+    check_marks(delimiter, decimal, source)
+    marks = {thousands} if isinstance(thousands, str) else set((thousands or {}).values())
+    if decimal == "," and decimal in marks:  # a column whose points part thousands has no fractions
+        raise RecordingError(
+            f"{source}: thousands = {decimal!r} is not allowed: it is the decimal mark"
+        )
+    if file.is_dir():
+        raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
+    if not header and not isinstance(columns, Sequence):
+        raise RecordingError(
+            f"{source}: without a header, columns must list what each column is: 'name [unit]'"
+        )
+    if is_text(file):
+        table = read_table(file, delimiter=delimiter, header=header)
+    else:
+        table = table_of(read_log(file))
+    wanted = _understood(renamed(table, columns, source), source)
+    if "time" not in wanted and sample_time is None:
+        raise RecordingError(
+            f"{source}: column 'time' is missing (give sample_time if the rows are evenly spaced)"
+        )
+    log, missing = _log(file, table, wanted, thousands, decimal)
+    clock = Clock("time", wanted["time"][1]) if "time" in wanted else Clock()
+    sources = [
+        Source(channel, channel, unit, absolute)
+        for channel, (_, unit, absolute) in wanted.items()
+        if channel != "time"
+    ]
+    (made,) = recordings_of(log, sources, clock, name or stem_of(file), role, sample_time)
+    issues = [Issue("log", channel, 0.0, made.duration, text) for channel, text in missing]
+    made = replace(made, issues=[*issues, *made.issues])
+    return completed(made, sources, source, ambient_pressure)
+
+
+# ------------------------------------------------------------------------- columns
+
+
+def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, bool]]:
+    """Canonical name -> (column, unit, whether absolute) of every heading that is to be used."""
+    problems: list[str] = []
+    wanted: dict[str, tuple[int, str, bool]] = {}
+    for index, heading in enumerate(headings):
+        if not heading.strip():
+            continue
+        match = HEADING.match(heading)
+        name = match["name"] if match else heading
+        channel = channel_of(name)
+        known = channel in CHANNELS and (channel != "time" or name == channel)
+        if match is None or not known or name.endswith("."):
+            hint = meant(channel.lower(), CHANNELS)
+            problems.append(
+                f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)"
+            )
+            continue
+        unit = match["unit"]
+        if unit is None or not unit.strip():
+            problems.append(
+                f"column {heading!r} has no unit: write '{name} [{CHANNELS[channel].unit}]', with "
+                "the unit its values are in"
+            )
+        elif name in wanted:
+            problems.append(f"column {heading!r}: the channel {name!r} is there twice")
+        else:
+            alone, kind = measured_from(unit.strip())
+            if trouble := unit_trouble(channel, alone):
+                problems.append(f"column {heading!r}: {trouble}")
+            wanted[name] = (index, alone, kind == "absolute")
+    if not problems and not set(wanted) - {"time"}:
+        problems.append("there is no channel to use")
+    if problems:
+        raise RecordingError(joined(source, problems))
+    return wanted
+
+
+def _log(
+    file: Path,
+    table: Table,
+    wanted: Mapping[str, tuple[int, str, bool]],
+    thousands: str | Mapping[str, str] | None,
+    decimal: str,
+) -> tuple[Log, list[tuple[str, str]]]:
+    """The channels of a table as series; what is no number counts as missing, and is said."""
+    if isinstance(thousands, Mapping):
+        strange = [key for key in thousands if key not in wanted]
+        if strange:
+            raise RecordingError(
+                f"{file}: thousands names {strange[0]!r}, but the channels are: {', '.join(wanted)}"
+            )
+    series: dict[str, Series] = {}
+    remarks: list[tuple[str, str]] = []
+    for name, (index, unit, _) in wanted.items():
+        mark = thousands_of(thousands, name)
+        values, missing = table.samples(index, f"{name} [{unit}]", str(file), mark, decimal)
+        remarks += [(name, missing)] if missing else []
+        series[name] = Series(name, values, unit)
+    return Log(file, series, remarks=table.remarks), remarks
+
+
+_NUMBERS = "biuf"  # kinds of arrays that are numbers
+_DATES = "mM"  # kinds that are times
+_MIXED = "OU"  # kinds that may be numbers among other things
+
+
+class Arrays(NamedTuple):
+    """A recording's channels.
+
+    Attributes
+    ----------
+    values : dict of str to (n,) array
+        By name.
+    units : dict of str to str
+        Of those whose table says it: in the heading (``muscle_pressure [bar]``), or in ``attrs`` of
+        a column or a frame.
+    """
+
+    values: dict[str, Array]
+    units: dict[str, str]
+
+
+def is_table(thing: Any) -> bool:
+    """True where something has channels by name: a dict, DataFrame or Dataset."""
+    return isinstance(thing, Mapping) or hasattr(thing, "columns")
+
+
+def _arrays_of(
+    recordings: Mapping[str, Any],
+    held_out: Sequence[str],
+    units: Mapping[str, str],
+    sample_time: float | None,
+) -> dict[str, Arrays]:
+    """Arrays by recording and channel, ``time`` among them where a table has one, as a channel, an
+    index or a coordinate.
+    """
+    if not isinstance(recordings, Mapping) or not recordings:
+        raise CaseError(
+            f"recordings = {as_said(recordings)} is not allowed: a mapping from names to tables, "
+            "one at least, is needed"
+        )
+    problems = list[str]()
+    tables = {name: _table(problems, name, table, units) for name, table in recordings.items()}
+    problems += [
+        f"recording {name!r} has no times: give it a channel time [s], or sample_time"
+        for name, table in tables.items()
+        if table.values and "time" not in table.values and sample_time is None
+    ]
+    problems += _names(tables, held_out, units)
+    if problems:
+        raise CaseError(joined("case", problems))
+    return tables
+
+
+def _table(problems: list[str], name: Any, table: Any, given: Mapping[str, str]) -> Arrays:
+    """Read the channels of one recording, with units given apart; adds to `problems`."""
+    if not isinstance(name, str):
+        problems.append(f"recording {name!r}: a name is needed that is a text")
+    found = Arrays({}, {})
+    if not is_table(table):
+        needed = "a dict of arrays, DataFrame or Dataset is needed"
+        problems.append(f"recording {name!r} = {as_said(table)}: {needed}")
+        return found
+    pairs = [(*_heading(key), values) for key, values in table.items()]
+    if "time" not in [key for key, _, _ in pairs]:
+        pairs += _times(table)
+    keys = [key for key, _, _ in pairs]
+    twice = [key for key in dict.fromkeys(keys) if keys.count(key) > 1]
+    problems += [f"recording {name!r} has {key!r} twice" for key in twice]
+    for key, unit, values in pairs:
+        label = f"recording {name!r}, {key!r}"
+        own = unit_of(key)
+        if is_quantity(values):
+            try:
+                values = plain(label, values, own)
+            except ParameterError as error:
+                problems.append(str(error))
+                continue
+            unit = own
+            if key in given:
+                problems.append(f"{label} has a unit of its own: units[{key!r}] is not allowed")
+        dated = key == "time" and np.asarray(values).dtype.kind in _DATES
+        array = _array(problems, label, values, dates=dated)
+        if array is not None:
+            found.values[key] = array
+            if said := "s" if dated else unit or _noted(key, values, table):
+                found.units[key] = said
+    if len(found.values) == len(pairs) and len({a.size for a in found.values.values()}) > 1:
+        told = ", ".join(f"{key} {values.size}" for key, values in found.values.items())
+        problems.append(f"recording {name!r}: arrays of one length are needed, not {told}")
+    if not set(found.values) - {"time"}:
+        problems.append(f"recording {name!r} has no channel but time")
+    return found
+
+
+def _heading(key: Any) -> tuple[Any, str]:
+    """Name and unit of ``muscle_pressure [bar]``; the unit is empty where it has none."""
+    match = HEADING.match(key) if isinstance(key, str) else None
+    return (match["name"], match["unit"] or "") if match and match["unit"] else (key, "")
+
+
+def _noted(key: str, values: Any, table: Any) -> str:
+    """The unit of a channel in ``attrs`` of itself, or of its table by name; empty without."""
+    for one in (values, table):
+        units = (getattr(one, "attrs", None) or {}).get("units")
+        if isinstance(units, Mapping):
+            units = units.get(key)
+        if isinstance(units, str):
+            return units
+    return ""
+
+
+def _times(table: Any) -> list[tuple[str, str, Any]]:
+    """Times of a table that are an index or a coordinate called ``time``."""
+    if "time" in getattr(table, "coords", ()):
+        return [("time", "", table.coords["time"])]
+    index = getattr(table, "index", None)
+    name, unit = _heading(getattr(index, "name", None))
+    return [("time", unit, index)] if name == "time" else []
+
+
+def _array(problems: list[str], label: str, values: Any, *, dates: bool) -> Array | None:
+    """One channel; times since the first where they are dates."""
+    masked = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
+    array = np.asarray(values)
+    if dates and array.size:
+        since = array - np.fmin.reduce(array) if array.dtype.kind == "M" else array
+        array = since / np.timedelta64(1, "s")
+    mixed = array.flat if array.dtype.kind in _MIXED else ()
+    if wrong := [value for value in mixed if not _is_number(value)]:
+        problems.append(f"{label} has values that are no numbers, such as {as_said(wrong[0])}")
+        return None
+    array = array.astype(np.float64) if array.dtype.kind == "O" else array
+    if array.dtype.kind not in _NUMBERS:
+        problems.append(f"{label} has the type {array.dtype}: numbers are needed")
+        return None
+    if array.ndim != 1 or array.size == 0:
+        problems.append(str(misshapen(label, array.shape)))
+        return None
+    found = array.astype(np.float64)
+    if masked is not None:
+        found[masked] = np.nan
+    return found
+
+
+def _is_number(value: Any) -> bool:
+    """True where a value converts to a float, or is None because it was not measured."""
+    try:
+        return value is None or float(value) is not None
+    except (TypeError, ValueError):
+        return False
+
+
+def _names(
+    tables: Mapping[str, Arrays], held_out: Sequence[str], units: Mapping[str, str]
+) -> list[str]:
+    """Problems of `held_out` and `units`: recordings or channels in them that do not exist."""
+    known = ", ".join(map(repr, tables))
+    channels = {key for table in tables.values() for key in table.values}
+    problems = [f"units[{k!r}]: no recording has that channel" for k in units if k not in channels]
+    if isinstance(held_out, str):
+        return [*problems, f"held_out = {held_out!r}: a list of names is needed"]
+    wrong = [name for name in held_out if name not in tables]
+    if wrong:
+        problems.append(f"held_out = {wrong}: recordings are {known}")
+    elif set(held_out) == set(tables):
+        problems.append(f"held_out = {list(held_out)}: one recording is needed that is fitted")
+    return problems
+
 
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *LOG)
 _RIG: Final = "rig.toml"
@@ -180,7 +516,7 @@ class Case(View):
                 f"rig = {as_said(rig)} is not allowed: a Rig is needed, as of pamrs.load_rig"
             )
         written = dict(units or {})
-        tables = arrays_of(recordings, held_out, written, sample_time)
+        tables = _arrays_of(recordings, held_out, written, sample_time)
         spacing = None if sample_time is None else check_sample_time(rig, sample_time)
         made = list[Recording]()
         for called, (table, own_units) in tables.items():

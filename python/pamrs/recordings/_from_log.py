@@ -1,29 +1,565 @@
-"""Recordings out of a log as it was written: channels by a mapping, parts of one file."""
+"""Recordings out of a log as it was written: channels by a mapping, with clocks of their own on one
+grid, parts of one file.
+"""
 
 from __future__ import annotations
 
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from pamrs._arrays import Array
-from pamrs.channels import CHANNELS, channel_of
+from pamrs._arrays import Array, Index, Mask
+from pamrs.channels import CHANNELS, channel_of, with_trait
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.recordings._case_keys import ROLES
+from pamrs.recordings._clock import (
+    GAP,
+    Grid,
+    Rows,
+    Ticks,
+    check_samples,
+    counted_on,
+    filled_rows,
+    gaps,
+    reading_rows,
+    spread,
+    ticks,
+    unit_of_stamps,
+    unwound,
+    usual_interval,
+)
 from pamrs.recordings._doubts import made_gauge
-from pamrs.recordings._mapping import Clock, Source, read_clock, read_sources
-from pamrs.recordings._recording import Issue, Recording
-from pamrs.recordings._several_clocks import Sampled, recording_of, sampled
-from pamrs.recordings._splitting import Cut, Split, parts, read_split
-from pamrs.recordings._stamps import Ticks, counted_on, ticks, unit_of_stamps
+from pamrs.recordings._recording import Issue, Laid, Recording, assemble, composed
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, switched, understood_unit
+from pamrs.recordings.mapping import ROLES, Clock, Source, read_clock, read_sources
 from pamrs.recordings.table import stem_of
 from pamrs.units import same_dimension, to_si
+
+_UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
+#: A diagnosis can do without them: they need not last as long as the others.
+SLOW: Final = frozenset(with_trait("slow"))
+COMMANDS: Final = frozenset(with_trait("command"))
+#: What does not say how fine the grid is: commands, which hold, keep their sum on any grid.
+UNTOLD: Final = SLOW | COMMANDS
+_FINEST: Final = 1000  # samples of the grid for each one that was recorded, at most
+_CUT: Final = 2.0  # samples at the ends whose loss is not worth a word
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """A channel as it was sampled.
+
+    Attributes
+    ----------
+    name : str
+        The channel.
+    values : (n,) array
+        SI values, NaN where there is none.
+    time : (n,) array
+        Seconds on the clock of the recording, finite.
+    unit : str
+        SI unit.
+    hold : bool
+        Logged on change: a value holds until the next one.
+    clock : Ticks, optional
+        The rows of the log that it was read from.
+    places : (n,) array of int, optional
+        Which of them it has values in; None if in all of them.
+    remarks : tuple of str
+        What was done to its values as they were read.
+    """
+
+    name: str
+    values: Array
+    time: Array
+    unit: str
+    hold: bool = False
+    clock: Ticks | None = None
+    places: Rows | None = None
+    remarks: tuple[str, ...] = ()
+
+    def rows(self, start: int, stop: int) -> Sampled:
+        """Copy of the channel with its samples ``start`` to ``stop`` (exclusive) alone."""
+        places = None if self.places is None else self.places[start:stop]
+        return replace(
+            self, values=self.values[start:stop], time=self.time[start:stop], places=places
+        )
+
+
+def sampled(name: str, values: Array, clock: Ticks, unit: str, hold: bool = False) -> Sampled:
+    """A channel with the times of its values.
+
+    Parameters
+    ----------
+    name : str
+        The channel.
+    values : (n,) array
+        SI values of all rows of the log, NaN where there is none.
+    clock : Ticks
+        When the rows were taken.
+    unit : str
+        SI unit.
+    hold : bool
+        Logged on change.
+
+    Returns
+    -------
+    Sampled
+        A channel that has values in few rows only has their times: a slower one is no fault, and a
+        command holds until it is written again. So has one whose readings the log repeats.
+    """
+    values = values[clock.rows]
+    remarks: list[str] = []
+    if unit == "rad":
+        values, said = unwound(values)
+        remarks += [said] if said else []
+    commanded = channel_of(name) in COMMANDS
+    places = np.flatnonzero(np.isfinite(values)) if hold else filled_rows(values)
+    repeated = None if hold or commanded else reading_rows(values)
+    if repeated is not None:
+        places, stay = repeated
+        rate = 1.0 / max(float(np.median(np.diff(clock.time[places]))), 1e-12)
+        remarks.append(f"each reading stays for {stay:g} rows: {rate:.2g} Hz, each counts once")
+    elif places is None or len(places) == len(values):
+        time = clock.time if hold else clock.spread[0]
+        return Sampled(name, values, time, unit, hold, clock, None, tuple(remarks))
+    elif not hold:
+        hold = commanded
+        told = "held until the next one" if hold else "taken as sampled at their own times"
+        remarks.append(f"{len(places)} of {len(values)} rows have a value of it: {told}")
+    time = clock.time[places] if hold else spread(clock.time[places])[0]
+    return Sampled(name, values[places], time, unit, hold, clock, places, tuple(remarks))
+
+
+def _recording_of(
+    name: str,
+    role: str,
+    channels: Sequence[Sampled],
+    source: str,
+    sample_time: float | None,
+    said: Mapping[str, str],
+) -> Recording:
+    """A recording of channels, whether they share a clock or not."""
+    first = channels[0].time
+    alike = all(
+        channel.time is first or np.array_equal(channel.time, first) for channel in channels
+    )
+    if not alike or any(channel.hold for channel in channels):
+        return _on_one_clock(name, role, channels, source, sample_time)
+    raw = {channel.name: channel.values for channel in channels}
+    units = {channel.name: channel.unit for channel in channels}
+    return assemble(name, role, first, raw, units, source, sample_time, said)
+
+
+class _Averaged(Grid):
+    """Grid coarser than the samples: means with weights that fall to zero one step of the grid
+    away, which delay nothing and keep a straight line as it is.
+    """
+
+    def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
+        """Means on the grid; where too little is on one side, what is recorded there."""
+        step = self.sample_time
+        first = np.searchsorted(self._stamps, self.time - step, side="left")
+        last = np.searchsorted(self._stamps, self.time + step, side="right")
+        weight, moment, total = (np.zeros(len(self.time)) for _ in range(3))
+        for offset in range(int(np.max(last - first, initial=0))):
+            place = np.minimum(first + offset, len(values) - 1)
+            away = self._stamps[place] - self.time
+            share = np.maximum(1.0 - np.abs(away) / step, 0.0)
+            share *= usable[place] & (first + offset < last)
+            weight += share
+            moment += share * away
+            total += share * np.where(usable[place], values[place], 0.0)
+        laid, mask = super().lay(values, usable)
+        even = (weight > 0.0) & (np.abs(moment) <= _UNEVEN * step * weight)
+        laid[even] = total[even] / weight[even]
+        return laid, mask | even
+
+
+class _Held(Grid):
+    """Events: each value holds until the next one; there may be only one."""
+
+    interpolates = False
+
+    def _place_samples(self) -> None:
+        """Do nothing: events are not interpolated."""
+
+    def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
+        """The last value at or before each time; NaN, and False in the mask, before the first."""
+        near = 1e-6 * self.sample_time
+        place = np.searchsorted(self._stamps, self.time + near, side="right") - 1
+        mask: Mask = (place >= 0) & usable[np.maximum(place, 0)]
+        laid = np.where(mask, values[np.maximum(place, 0)], np.nan)
+        return laid, mask
+
+
+class _Commanded(_Held):
+    """Grid of commands, which hold between samples: their mean over the step of the grid that
+    follows, which keeps their integral.
+    """
+
+    def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
+        """Means; NaN, and False in the mask, where the command was not recorded."""
+        _, mask = super().lay(values, usable)
+        near = 1e-6 * self.sample_time
+        lasting = np.diff(self._stamps)
+        lost = ~usable[:-1] | (lasting > GAP * self.usual)
+        safe = np.where(usable, values, 0.0)
+        total = np.concatenate([[0.0], np.cumsum(safe[:-1] * lasting)])
+        losses = np.concatenate([[0], np.cumsum(lost)])
+        edges = np.append(self.time, self.time[-1] + self.sample_time)
+        place = np.searchsorted(self._stamps, edges + near, side="right") - 1
+        place = np.clip(place, 0, len(values) - 1)
+        upto = total[place] + safe[place] * (edges - self._stamps[place])
+        mask = mask & (losses[np.minimum(place[1:], len(lasting))] == losses[place[:-1]])
+        same = place[1:] == place[:-1]
+        mean = np.where(same, safe[place[:-1]], np.diff(upto) / self.sample_time)
+        return np.where(mask, mean, np.nan), mask
+
+
+def _on_one_clock(
+    name: str, role: str, channels: Sequence[Sampled], source: str, sample_time: float | None
+) -> Recording:
+    """A recording of channels with different clocks, where all of them were sampled.
+
+    By default its grid is that of the fastest measured channel (commands and temperatures left
+    out). On a coarser one a channel is averaged, on a finer one it is interpolated between
+    neighbours.
+    """
+    stepped = [channel for channel in channels if not channel.hold]
+    if not stepped:
+        raise RecordingError(f"{source}: every channel has hold = true; one sampled one is needed")
+    rows = {channel.name: _rising(channel, source) for channel in channels}
+    usual: dict[str, float] = {}
+    for channel in stepped:
+        intervals = np.diff(channel.time[rows[channel.name]])
+        usual[channel.name] = usual_interval(intervals, len(channel.time))
+    telling = [each for each in stepped if channel_of(each.name) not in UNTOLD] or stepped
+    step = sample_time or min(usual[channel.name] for channel in telling)
+    ended = [each for each in stepped if channel_of(each.name) not in SLOW] or stepped
+    start, time = _common(ended, step, source)
+    issues: list[Issue] = []
+    laid: dict[str, Laid] = {}
+    for channel in channels:
+        own = rows[channel.name]
+        stamps = channel.time[own] - start
+        interval = usual.get(channel.name, step)
+        kind = Grid
+        if channel_of(channel.name) in COMMANDS and len(own) > 1:
+            kind = _Commanded
+        elif channel.hold:
+            kind = _Held
+        elif 2.0 * interval <= step * 1.01:
+            kind = _Averaged
+        if not channel.hold:
+            issues += _missing(channel.name, stamps, interval, time, step)
+        grid = kind(stamps, own, step, np.inf if channel.hold else interval, [], time)
+        laid[channel.name] = Laid(channel.values[own], grid, channel.hold)
+    units = {channel.name: channel.unit for channel in channels}
+    return composed(name, role, laid, issues, source, units)
+
+
+def _rising(channel: Sampled, source: str) -> Index:
+    """Rows whose times differ from the row before; the last one of events at the same time."""
+    intervals = np.diff(channel.time)
+    if np.any(intervals < 0.0):
+        at = int(np.argmax(intervals < 0.0))
+        raise RecordingError(
+            f"{source}: the clock of {channel.name!r} steps back by {-float(intervals[at]):.6g} s "
+            f"at {float(channel.time[at]):.6g} s; with several clocks that is not allowed (split = "
+            "'clock' makes a recording of each part)"
+        )
+    keep = np.concatenate([intervals > 0.0, [True]] if channel.hold else [[True], intervals > 0.0])
+    rows = np.flatnonzero(keep)
+    if len(rows) < 2 and not channel.hold:
+        raise RecordingError(
+            f"{source}: {channel.name!r} has {len(rows)} samples at different times; 2 are needed "
+            "(hold = true if it is logged on change)"
+        )
+    return rows
+
+
+def _common(channels: Sequence[Sampled], step: float, source: str) -> tuple[float, Array]:
+    """Start time and grid of the stretch in which all channels were sampled."""
+    start = max(float(channel.time[0]) for channel in channels)
+    stop = min(float(channel.time[-1]) for channel in channels)
+    check_samples(max(stop - start, 0.0), step, source)
+    count = int(np.floor((stop - start) / step + 0.05)) + 1
+    if stop <= start or count < 2:
+        spans = "; ".join(
+            f"{channel.name} from {channel.time[0]:.9g} to {channel.time[-1]:.9g} s"
+            for channel in channels
+        )
+        raise RecordingError(
+            f"{source}: the channels were not sampled at the same time: {spans} (time = {{ offset "
+            "= ... }} of a channel moves its clock)"
+        )
+    most = _FINEST * max(len(channel.time) for channel in channels)
+    if count > most:
+        raise RecordingError(
+            f"{source}: {stop - start:.6g} s in steps of {step:.6g} s are {count} samples, more "
+            f"than {_FINEST:g} times what was recorded; long pauses part recordings with split = "
+            "{ gap = ... }, and sample_time says another step"
+        )
+    return start, np.arange(count, dtype=np.float64) * step
+
+
+def _missing(name: str, stamps: Array, interval: float, time: Array, step: float) -> list[Issue]:
+    """Issues of a channel: its gaps, and its samples outside the recording."""
+    elapsed = np.diff(stamps)
+    events = gaps(stamps, elapsed, np.zeros(len(elapsed), dtype=bool), interval)
+    last = float(time[-1])
+    found = [
+        Issue("gap", name, max(0.0, event.start), min(last, event.stop), event.text)
+        for event in events
+        if event.stop > 0.0 and event.start < last
+    ]
+    for lost, words, at in (
+        (-float(stamps[0]), "before another channel begins", 0.0),
+        (float(stamps[-1]) - last, "after another channel ends", last),
+    ):
+        if lost > _CUT * step:
+            text = f"{lost:.4g} s of it, {words}, are left out"
+            found.append(Issue("gap", name, at, at, text))
+    return found
+
+
+_ALLOWED: Final = "'clock', { gap = SECONDS } or { column = \"...\" }"
+_FEWEST: Final = 2  # samples of a part; what is shorter is left out
+_MOST: Final = 10_000
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Rule that parts a log: at pauses longer than `gap` [s], by a column, else by its clock."""
+
+    gap: float | None = None
+    column: str | None = None
+
+
+class Split(NamedTuple):
+    """The column that parts a log, its clock, and its texts where it has texts."""
+
+    values: Array
+    clock: Ticks
+    labels: tuple[str, ...]
+
+
+class Stretch(NamedTuple):
+    """Rows ``start`` to ``stop`` (exclusive) with number, from 1, and label, empty for no part."""
+
+    number: int
+    label: str
+    start: int
+    stop: int
+
+
+class Part(NamedTuple):
+    """One recording of several: its number and text, and its channels."""
+
+    number: int
+    label: str
+    channels: list[Sampled]
+
+
+def _read_split(split: Any, source: str) -> Cut | None:
+    """Cut that the key ``split`` of a recording says."""
+    if split is None:
+        return None
+    if split == "clock":
+        return Cut()
+    if isinstance(split, Mapping) and len(split) == 1:
+        gap, column = split.get("gap"), split.get("column")
+        if isinstance(gap, (int, float)) and not isinstance(gap, bool) and 0.0 < gap < math.inf:
+            return Cut(gap=float(gap))
+        if isinstance(column, str) and column:
+            return Cut(column=column)
+    raise RecordingError(f"{source}: split = {split!r} is not allowed: {_ALLOWED} is needed")
+
+
+def parts(
+    channels: Sequence[Sampled],
+    cut: Cut,
+    column: Split | None,
+    pieces: Sequence[int | str] | None,
+    source: str,
+) -> tuple[list[Part], list[str], list[str]]:
+    """Part the channels of a log.
+
+    Parameters
+    ----------
+    channels : sequence of Sampled
+        The channels; their clocks may differ.
+    cut : Cut
+        How.
+    column : Split or None
+        What `cut` names, if it names a column.
+    pieces : sequence of int or str, optional
+        Numbers (from 1) or texts of the parts to keep; by default all.
+    source : str
+        The file, for messages.
+
+    Returns
+    -------
+    parts : list of Part
+        In the order of the log.
+    left : list of str
+        What the parts are called that `pieces` does not name.
+    remarks : list of str
+        Parts that are left out, since a channel has fewer than two samples there.
+
+    Raises
+    ------
+    RecordingError
+        If there is nothing to cut, or no such piece.
+    """
+    reference = next((item for item in channels if not item.hold), channels[0])
+    clock = column.clock if column is not None else _clock_of(reference)
+    several = {id(_clock_of(item)): _clock_of(item) for item in channels if not item.hold}
+    if cut.gap is None and column is None and len(several) > 1:
+        made = _by_clock(channels, source)
+    else:
+        made = _cut(channels, clock, stretches_of(cut, clock.spread[0], column))
+    found = [
+        part
+        for part in made
+        if all(len(item.time) >= _FEWEST or item.hold and len(item.time) for item in part.channels)
+    ]
+    short = [part.label for part in made if part not in found]
+    if len(found) > _MOST:
+        raise RecordingError(f"{source}: split gives {len(found)} parts; {_MOST} are allowed")
+    if not found:
+        raise RecordingError(f"{source}: split leaves no part in which every channel has samples")
+    chosen = found if pieces is None else _chosen(found, pieces, short, source)
+    if pieces is not None:
+        return chosen, [part.label for part in made if part not in chosen], []
+    listed = f"{len(short)} of {len(made)} parts ({', '.join(short[:8])})"
+    remark = f"{listed} are left out: a channel has fewer than {_FEWEST} samples there"
+    return chosen, [], [remark] if short else []
+
+
+def stretches_of(cut: Cut, time: Array, column: Split | None) -> list[Stretch]:
+    """Stretches into which a clock is parted by a rule.
+
+    Parameters
+    ----------
+    cut : Cut
+        How.
+    time : (n,) array
+        The clock [s].
+    column : Split or None
+        What `cut` names, if it names a column.
+
+    Returns
+    -------
+    list of Stretch
+        Those that have a label, counted from 1.
+    """
+    if column is not None:
+        before, after = column.values[:-1], column.values[1:]
+        begins = (after != before) & ~(np.isnan(after) & np.isnan(before))
+    else:
+        steps = np.diff(time)
+        begins = steps < 0.0 if cut.gap is None else steps > cut.gap
+    edges = np.flatnonzero(begins) + 1
+    bounds = [0, *edges.tolist(), len(time)]
+    starts = bounds[:-1]
+    labels = _labels(column, starts) if column else [str(k + 1) for k in range(len(starts))]
+    named = [part for part in zip(labels, starts, bounds[1:], strict=True) if part[0]]
+    return [Stretch(number, *part) for number, part in enumerate(named, start=1)]
+
+
+def _clock_of(item: Sampled) -> Ticks:
+    return item.clock or Ticks(np.arange(len(item.time)), item.time)
+
+
+def _labels(column: Split, starts: Sequence[int]) -> list[str]:
+    """Text of the column in each part, numbered where it repeats; empty without a value."""
+    seen: dict[str, int] = {}
+    labels: list[str] = []
+    for start in starts:
+        value = float(column.values[start])
+        if math.isnan(value) or (column.labels and not column.labels[int(value)].strip()):
+            labels.append("")
+            continue
+        text = column.labels[int(value)].strip() if column.labels else f"{value:.6g}"
+        seen[text] = seen.get(text, 0) + 1
+        labels.append(text if seen[text] == 1 else f"{text} ({seen[text]})")
+    return labels
+
+
+def _cut(channels: Sequence[Sampled], clock: Ticks, stretches: Sequence[Stretch]) -> list[Part]:
+    """Parts by rows where a channel has the clock that was cut, else by time."""
+    time = clock.spread[0]
+    found = []
+    for number, label, start, stop in stretches:
+        low = float(time[start])
+        high = float(time[stop]) if stop < len(time) else math.inf
+        inside = [_inside(item, clock, start, stop, low, high) for item in channels]
+        found.append(Part(number, label, inside))
+    return found
+
+
+def _inside(item: Sampled, clock: Ticks, start: int, stop: int, low: float, high: float) -> Sampled:
+    """Samples of a channel in a part; a held channel also has the value from before the part."""
+    own = item.clock
+    if own is clock or (own is not None and np.array_equal(own.time, clock.time)):
+        if item.places is None:
+            return item.rows(start, stop)
+        first, last = (int(np.searchsorted(item.places, edge)) for edge in (start, stop))
+        before = item.hold and first > 0 and (first == last or item.places[first] > start)
+    else:
+        first, last = (int(np.searchsorted(item.time, edge)) for edge in (low, high))
+        before = item.hold and first > 0
+    inside = item.rows(first - before, last)
+    if before:
+        time = inside.time.copy()
+        time[0] = min(time[0], low)
+        inside = replace(inside, time=time)
+    return inside
+
+
+def _by_clock(channels: Sequence[Sampled], source: str) -> list[Part]:
+    """Parts of rising time, each channel by its own clock."""
+    cut = {item.name: stretches_of(Cut(), _clock_of(item).spread[0], None) for item in channels}
+    counts = {name: len(found) for name, found in cut.items()}
+    if len(set(counts.values())) > 1:
+        said = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise RecordingError(
+            f"{source}: split = 'clock': the clocks of the channels give different numbers of "
+            f"parts ({said})"
+        )
+    each = [_cut([item], _clock_of(item), cut[item.name]) for item in channels]
+    return [
+        Part(same[0].number, same[0].label, [part.channels[0] for part in same])
+        for same in zip(*each, strict=True)
+    ]
+
+
+def _chosen(
+    found: list[Part], pieces: Sequence[int | str], short: Sequence[str], source: str
+) -> list[Part]:
+    kept: list[Part] = []
+    labels: dict[int | str, Part] = {part.label: part for part in found}
+    labels |= {part.number: part for part in found}
+    asked = f"{source}: pieces = {list(pieces)!r}"
+    for piece in pieces:
+        if not isinstance(piece, bool) and piece in labels:
+            kept.append(labels[piece])
+            continue
+        if str(piece) in short:
+            few = f"a channel has fewer than {_FEWEST} samples"
+            raise RecordingError(f"{asked}: in part {piece!r} {few}")
+        some = ", ".join(repr(part.label) for part in found[:8])
+        more = " and so on" if len(found) > 8 else ""
+        raise RecordingError(
+            f"{asked}: there is no part {piece!r}; there are {len(found)}, called {some}{more}"
+        )
+    return kept
 
 
 def load_recordings(
@@ -96,7 +632,7 @@ def load_recordings(
     if not sources:
         raise RecordingError(f"{source}: every channel has a value; one of the log is needed")
     clock = read_clock(time, source)
-    cut = read_split(split, source)
+    cut = _read_split(split, source)
     content = log or read_log(file, form)
     called = name or stem_of(file)
     found = recordings_of(content, sources, clock, called, role, sample_time, cut, pieces)
@@ -211,7 +747,7 @@ def recordings_of(
     if cut is None:
         if pieces is not None:
             raise RecordingError(f"{source}: pieces = {list(pieces)!r} needs split")
-        made = [recording_of(name, role, channels, source, sample_time, said)]
+        made = [_recording_of(name, role, channels, source, sample_time, said)]
         return _with_remarks(made, log, channels, [])
     column = None
     if cut.column is not None:
@@ -220,7 +756,7 @@ def recordings_of(
         column = Split(series.values[ticks.rows], ticks, series.labels)
     found, left, remarks = parts(channels, cut, column, pieces, source)
     made = [
-        recording_of(f"{name}_{part.label}", role, part.channels, source, sample_time, said)
+        _recording_of(f"{name}_{part.label}", role, part.channels, source, sample_time, said)
         for part in found
     ]
     made = [replace(each, left=tuple(left)) for each in made]

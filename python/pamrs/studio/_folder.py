@@ -17,7 +17,7 @@ from pamrs._files import MOST_NAME, found_outside, is_inside, parse_toml, read_t
 from pamrs._writing import write_atomically
 from pamrs.channels import channel_of
 from pamrs.diagnosis import Diagnosis, DiagnosisSettings
-from pamrs.diagnosis.ready import readied
+from pamrs.diagnosis.prepare import readied
 from pamrs.diagnosis.result import load_result
 from pamrs.errors import CaseError, PamrsError, ParameterError
 from pamrs.recordings import Case, LogProposal, Proposal, channels_of, load_case, propose
@@ -89,7 +89,7 @@ class Studio:
     ----------
     folder : Path
         The folder, links followed.
-    checked : Check or None
+    checked : CheckedCase or None
         The last check, if nothing was changed on the page since.
     run : Run or None
         The last diagnosis of this page.
@@ -103,7 +103,7 @@ class Studio:
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         Path(folder).mkdir(parents=True, exist_ok=True)
         self.folder = resolved(folder)
-        self.checked: Check | None = None
+        self.checked: CheckedCase | None = None
         self.run: Run | None = None
         self.lock = threading.RLock()
         self._tables: list[LogTable] | None = None
@@ -316,7 +316,7 @@ class Studio:
 
     # Check, run, result ------------------------------------------------------------------------
 
-    def check(self) -> Check:
+    def check(self) -> CheckedCase:
         """Read the whole case as a diagnosis does."""
         try:
             rig, error = self.rig()
@@ -326,7 +326,7 @@ class Studio:
                 raise CaseError("channels and units are not confirmed yet")
             found = checked(load_case(self.folder))
         except (PamrsError, OSError) as error:
-            found = Check(self.said(error))
+            found = CheckedCase(self.said(error))
         self.checked = found
         return found
 
@@ -473,7 +473,7 @@ def _chosen(table: LogTable, columns: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Check:
+class CheckedCase:
     """Result of a check of the case.
 
     Attributes
@@ -491,7 +491,7 @@ class Check:
     inputs: dict[str, str] = field(default_factory=dict)
 
 
-def checked(case: Case) -> Check:
+def checked(case: Case) -> CheckedCase:
     """Look at a case as a diagnosis does before it fits anything.
 
     Parameters
@@ -501,7 +501,7 @@ def checked(case: Case) -> Check:
 
     Returns
     -------
-    Check
+    CheckedCase
 
     Raises
     ------
@@ -510,7 +510,7 @@ def checked(case: Case) -> Check:
     """
     ready = readied(case, DiagnosisSettings())
     cautions = [*case.rig.cautions, *ready.suspected, *ready.doubts, *_issues(case)]
-    return Check("", list(dict.fromkeys(cautions)), dict(case.inputs))
+    return CheckedCase("", list(dict.fromkeys(cautions)), dict(case.inputs))
 
 
 def _issues(case: Case) -> list[str]:

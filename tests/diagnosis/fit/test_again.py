@@ -12,8 +12,9 @@ import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis.fit import known_parameters, with_effects_of, with_known, without_passing
+from pamrs.diagnosis.fit import known_parameters, with_effects_of, with_known
 from pamrs.diagnosis.fit._known_parameters import _HELD_SHARE
+from pamrs.diagnosis.prepare import without_passing
 from tests.diagnosis import again
 
 SHOULDER = pamrs.rigs.shoulder()

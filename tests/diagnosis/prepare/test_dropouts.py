@@ -13,7 +13,7 @@ import pytest
 import pamrs
 from pamrs.diagnosis.prepare import without_impossible
 from pamrs.recordings import Issue, Recording, load_recording
-from pamrs.recordings._faults import find_faults
+from pamrs.recordings._recording import find_faults
 from tests.diagnosis.asked import SETTINGS
 from tests.diagnosis.noisy import whole
 from tests.diagnosis.test_load import RIG, recording

@@ -13,7 +13,7 @@ import pamrs
 from pamrs.diagnosis import _problems
 from pamrs.diagnosis.fit import Fit, Problem, residuals
 from pamrs.diagnosis.noise import inflation_of, no_inflation
-from pamrs.diagnosis.ready import readied
+from pamrs.diagnosis.prepare import readied
 from pamrs.diagnosis.search import refitted, with_inflation
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig

@@ -15,8 +15,7 @@ from scipy.signal import decimate
 
 import pamrs
 from pamrs.diagnosis.prepare import overlap, without_copies
-from pamrs.diagnosis.prepare._deviations import WINDOW_SAMPLES
-from pamrs.diagnosis.prepare._overlap import _GAP
+from pamrs.diagnosis.prepare._copies import _GAP, WINDOW_SAMPLES
 from pamrs.recordings import Recording
 from tests.diagnosis.held import RIG as CHAMBER
 from tests.diagnosis.held import hold

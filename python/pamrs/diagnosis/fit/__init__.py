@@ -9,8 +9,8 @@ other), `free_baseline`, `bin_width`, `Key`, `Residuals`, `Stages`;
 `form_in`, `entry_of`, `with_effects_of`, `with_entry`, `without_term` (effects of a rig
 and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
-`depends`, `fits`, `places_of`, `same_data_in` (where effects act); `holdable`,
-`without_passing`, `known_parameters`, `with_known` (effects that the nominal model holds, and what
+`depends`, `fits`, `places_of`, `same_data_in` (where effects act);
+`known_parameters`, `with_known` (effects that the nominal model holds, and what
 is known of all parameters); `ends_in_tolerances`,
 `moved_value` (how far they may move); `spread_over_pieces`
 (standard deviations of coloured residuals).
@@ -49,11 +49,9 @@ from pamrs.diagnosis.fit._fitting import (
 )
 from pamrs.diagnosis.fit._known_parameters import (
     ends_in_tolerances,
-    holdable,
     known_parameters,
     moved_value,
     with_known,
-    without_passing,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._leave_one_out import predicted_by_others
@@ -100,7 +98,6 @@ __all__ = [
     "fits",
     "form_in",
     "free_baseline",
-    "holdable",
     "known_parameters",
     "levenberg_marquardt",
     "look_for_events",
@@ -119,6 +116,5 @@ __all__ = [
     "with_known",
     "with_offsets",
     "with_priors",
-    "without_passing",
     "without_term",
 ]

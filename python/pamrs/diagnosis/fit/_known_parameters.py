@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pamrs.diagnosis.fit._starts import CHOSEN
-from pamrs.effects import CATALOGUE, EFFECTS, Form, effect_of, find_parameter
+from pamrs.effects import EFFECTS, Form, effect_of, find_parameter
 from pamrs.rig import Parameter, Rig, named_entries
 
 # least tolerance of a held effect: its deviation came of a lacking model (decision 34)
@@ -24,19 +24,6 @@ _FIXED = (*CHOSEN, "threshold")
 
 def _form(entry: Mapping[str, Any]) -> Form:
     return EFFECTS[entry["id"]].form(entry.get("form", ""))
-
-
-def holdable(entry: Mapping[str, Any]) -> bool:
-    """True where an effect of a model can be part of a baseline that all recordings share."""
-    return entry["id"] in CATALOGUE and not _form(entry).transient
-
-
-def without_passing(rig: Rig) -> Rig:
-    """Rig without effects that no baseline can hold: events, and forms without a name."""
-    for entry in rig.effects:
-        if not holdable(entry):
-            rig = rig.without_effect(entry["id"], at=entry.get("at", ""))
-    return rig
 
 
 def known_parameters(rig: Rig) -> dict[str, Parameter]:

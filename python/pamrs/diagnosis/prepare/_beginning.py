@@ -19,16 +19,15 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array, Index, Mask
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.prepare._blocks import (
+from pamrs.diagnosis.prepare._blocks import Block, Tube
+from pamrs.diagnosis.prepare._residual import (
     WINDOW_SAMPLES_PER_STATE,
-    Block,
     Residual,
-    Tube,
+    TimeBefore,
     predicted,
     residual,
 )
 from pamrs.diagnosis.prepare._signals import Prepared
-from pamrs.diagnosis.prepare._time_before import TimeBefore
 from pamrs.errors import SimulationError
 from pamrs.rig.schema import qualified
 

@@ -1,37 +1,34 @@
-"""The blocks of a rig between measured channels, and the residual of each with exact
-sensitivities.
-"""
+"""Blocks of a rig between measured channels, and recordings at the rate that they need."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from pamrs import _core
 from pamrs._arrays import Array, Mask
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of, thermometers_of
-from pamrs.diagnosis.prepare._time_before import TimeBefore
+from pamrs.diagnosis.prepare._signals import (
+    DRIVEN_COMMANDS,
+    held,
+    pulls_of,
+    thermometers_of,
+)
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CLOSURE_OF
+from pamrs.errors import DiagnosisError
+from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.rig.schema import keys_of, qualified
-from pamrs.simulation import default_step
 
 # [s] a joint's windows: its start has faded, a wrong break-away spoils no more (decision 14)
 _ARM_WINDOW = 2.5
 _SUPPLY_WINDOW = 4.0  # [s] windows of a tank or a regulator
 _CHAMBER_WINDOW = 2.0  # [s] windows of a chamber that is fed; a sealed one is one window
-# standard deviations of an unmeasured start of a gas between what it can be at the most
-_START_DEVIATIONS = 4.0
-# repetitions of a prediction until the temperature at which its gas begins stands still
-_START_STEPS = 5
 _LEAST_PRESSURE_SHARE = 0.01  # share of the ambient pressure that a noisy gauge shows at the least
-# usable samples of a window for each state whose start is projected out, or it is not used
-WINDOW_SAMPLES_PER_STATE = 4
 # [s] longest step of joints and loads: an error of 0.03 noises, 0.17 at most (decision 57)
 _ARM_STEP = 5e-3
 # [s] the same of tanks and chambers, divided until stable: 0.003 noises (decision 57)
@@ -717,490 +714,108 @@ def _all_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block | Unjudged]:
     return [block for block in blocks if block is not None]
 
 
-@dataclass(frozen=True, eq=False)
-class Residual:
-    """Measured minus predicted output of one block over one recording, with the window's start
-    projected out.
-
-    Attributes
-    ----------
-    value : (n,) array
-        Residual in the channel's unit; 0 in unusable rows.
-    jacobian : (n, k) array or None
-        Derivative of the *prediction* with respect to each parameter, start projected out as well.
-    prediction : (n,) array
-        Predicted channel, for looking at.
-    rows : (n,) bool array
-        Usable rows.
-    noise : float
-        Noise of the channel.
-    starts : list of (a, b, q)
-        Windows with an orthogonal basis of what their start can do; what a residual without a
-        jacobian is freed of. A direction of length one is free, a shorter one held by a prior.
-    temperature : float or None
-        Temperature at which a gas without a thermometer begins [K].
-    strain : float
-        Squares of how far that is from the room's, in standard deviations of what it may be.
-    response : (n, k) array or None
-        Derivative of the prediction with respect to the height of an input at each knot of the
-        window that a row belongs to, start projected out.
-    """
-
-    value: Array
-    jacobian: Array | None
-    prediction: Array
-    rows: Mask
-    noise: float
-    starts: list[tuple[int, int, Array]] = field(default_factory=list)
-    temperature: float | None = None
-    strain: float = 0.0
-    response: Array | None = None
-
-    def freed(self, values: Array) -> Array:
-        """Values (n,) without what the starts of windows can do, 0 in unusable rows."""
-        out = np.where(self.rows, values, 0.0)
-        for a, b, q in self.starts:
-            out[a:b] -= q @ (q.T @ out[a:b])
-        return np.where(self.rows, out, 0.0)
+# [s] sample time that is needed where every block is a sealed chamber, which hardly moves
+_NEEDED_SEALED_SAMPLE_TIME = 0.1
 
 
-def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) -> Array:
-    """Residual under another model, freed of the same starts as one that was computed with its
-    sensitivities.
+_HELD = (*DRIVEN_COMMANDS, "reference")
+"""Entry ``k`` holds from sample ``k`` to the next, where a measured one is of its instant."""
+
+
+def averaged_to_need(
+    recordings: Sequence[Recording], blocks: Sequence[Block], case: str, settings: DiagnosisSettings
+) -> tuple[list[Recording], list[int]]:
+    """Recordings of a case at the rate that its blocks need.
+
+    Means over so many samples that the fastest block still has the sample time that it needs, and
+    that `ample_samples` are left; a short or slow recording stays as it is.
 
     Parameters
     ----------
-    block : Block
-        Which block.
-    core : _core.Rig
-        The other model, compiled.
-    prepared : Prepared
-        The recording.
-    base : Residual
-        The residual of a model near to it.
+    recordings : sequence of Recording
+        Those of a case.
+    blocks : sequence of Block
+        The blocks that are judged.
+    case : str
+        Its name, for the message.
+    settings : DiagnosisSettings
+        What is needed, and how much is too much.
 
     Returns
     -------
-    (n,) array
-        In the channel's unit; 0 in unusable rows.
-    """
-    if base.temperature is not None:
-        prepared = replace(prepared, temperatures={block.channel: base.temperature})
-    prediction = predicted(block, core, prepared)
-    measured = np.where(
-        prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
-    )
-    return base.freed(measured - prediction)
+    recordings : list of Recording
+    counts : list of int
+        Recorded samples in each sample, 1 where nothing was averaged.
 
-
-def signals_at_starts(
-    block: Block, prepared: Prepared, starts: list[int]
-) -> dict[str, tuple[Array, Array]]:
-    """Smoothed channels, with the best estimates, where windows start, of what a block integrates
-    (an arm: all joints); inlets of lines only where the block is cut there.
+    Raises
+    ------
+    DiagnosisError
+        If there are more than `most_samples` even so.
     """
-    state = [
-        n
-        for n in prepared.signals
-        if n in (block.channel, block.thermometer)
-        or (block.kind == "arm" and channel_of(n) == "joint_angle")
+    sealed = bool(blocks) and all(block.window is None for block in blocks)
+    needed = _NEEDED_SEALED_SAMPLE_TIME if sealed else settings.needed_sample_time
+    counts = [
+        _odd(min(needed / r.sample_time, len(r) / settings.ample_samples)) for r in recordings
     ]
-    around = {block.channel, *block.drives}
-    drives = {
-        n: s
-        for n, s in prepared.signals.items()
-        if n == block.thermometer
-        or (channel_of(n) in DRIVES and (channel_of(n) != "line_pressure" or n in around))
-    }
-    at_starts = {name: prepared.with_starts(name, starts) for name in state if name in drives}
-    return drives | at_starts | _warm(block, prepared)
+    shortened = [averaged(r, count) for r, count in zip(recordings, counts, strict=True)]
+    total = sum(len(r) for r in shortened)
+    if total > settings.most_samples:
+        longest = max(shortened, key=len)
+        raise DiagnosisError(
+            f"case {case!r}: its recordings have {total} samples at the rate that its blocks need; "
+            f"at most {settings.most_samples} are diagnosed at a time: choose parts by start and "
+            f"stop in case.toml (the longest is {longest.name!r}, {longest.duration:.4g} s)"
+        )
+    return shortened, counts
 
 
-def _warm(block: Block, prepared: Prepared) -> dict[str, tuple[Array, Array]]:
-    """The temperature at which a gas without a thermometer begins, as one would read it there."""
-    if block.warm is None:
-        return {}
-    begins = prepared.temperatures.get(block.channel, block.warm.room)
-    return {block.warm.channel: (np.full(prepared.n, begins), np.zeros(prepared.n))}
+def _odd(ratio: float) -> int:
+    """The largest odd number up to a ratio: the mean of an odd number of samples is at one."""
+    whole = int(ratio * (1.0 + 1e-9))
+    return max(1, whole - 1 + whole % 2)
 
 
-def _core_of_recording(core: _core.Rig, prepared: Prepared) -> _core.Rig:
-    """A compiled rig with the values that it had in a recording."""
-    values = prepared.recording.parameters
-    if not values:
-        return core
-    known = dict(zip(core.parameter_names, core.values.tolist(), strict=True))
-    revalued = core.revalued({n: value.at(known[n]) for n, value in values.items() if n in known})
-    if revalued is None:
-        raise AssertionError("values of a recording are those of parameters that can vary")
-    return revalued
-
-
-def predicted(
-    block: Block,
-    core: _core.Rig,
-    prepared: Prepared,
-    outlets: dict[str, float] | None = None,
-    before: TimeBefore | None = None,
-) -> Array:
-    """A block's output over a recording, every window from its measured start.
+def averaged(recording: Recording, count: int) -> Recording:
+    """Means over so many samples each, an odd number; at the middle one's time.
 
     Parameters
     ----------
-    block : Block
-        Which block.
-    core : _core.Rig
-        The compiled model.
-    prepared : Prepared
-        The recording.
-    outlets : dict of str to float, optional
-        Where regulators without a gauge begin [Pa, gauge], by their full names; at the pressure of
-        what they feed by default.
-    before : TimeBefore, optional
-        What nobody measured begins as this leaves it, and not at rest.
+    recording : Recording
+        What is averaged; at least half of the samples of a mean must be usable.
+    count : int
+        An odd number; 1 leaves the recording as it is.
 
     Returns
     -------
-    (n,) array
-        In the channel's unit.
+    Recording
+        With the commands of the log beside their means: a valve lets through what its openings do
+        one after the other, not what their mean does.
     """
-    core = _core_of_recording(core, prepared)
-    starts = prepared.starts(block.window, block.drives)
-    commands = prepared.driving(mechanical=block.mechanical)
-    signals, lead = signals_at_starts(block, prepared, starts), 0
-    if before is not None:
-        lead = before.samples
-        commands = before.commands(commands, prepared.n)
-        measured = {name: signal for name, signal in signals.items() if name in prepared.signals}
-        signals = before.signals(measured, prepared)
-        # what is measured starts anew at every sample of it
-        starts = [*range(lead), *(lead + start for start in starts)]
-    prediction, _ = core.predict(
-        block.name,
-        commands,
-        prepared.dt,
-        default_step(prepared.dt, longest=block.step),
-        starts,
-        [],
-        signals,
-        lead + prepared.n,
-        outlets,
-        _anchors(block, prepared, starts, lead),
-    )
-    return prediction[lead:]
-
-
-def _anchors(block: Block, prepared: Prepared, starts: list[int], lead: int = 0) -> list[int]:
-    """Samples at which the pressures of a block are taken anew inside its windows."""
-    if block.anchor is None:
-        return []
-    each = (lead + start for start in prepared.starts(block.anchor, block.drives))
-    return sorted(set(each) - set(starts))
-
-
-def _start_columns(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
-    """Columns of what the start of a window can do, (n, k): of a pressure without the temperature
-    at which its gas began once that is forgotten; of a temperature without where a thermometer
-    stood that is not late.
-    """
-    # what drove a gas in a hole of the recording before is not known
-    hole = block.warm is not None and at > 0 and not prepared.clear(block.drives)[at - 1]
-    if hole or block.kind == "temperature":
-        return start[:, start.any(axis=0)]
-    if block.warm is None and not block.thermometer:
-        return start
-    noise, settings = prepared.noise[block.channel], prepared.settings
-    with np.errstate(over="ignore"):  # of a model that ran away, which no fit keeps
-        remembered = float(np.linalg.norm(start[:, -1])) * settings.begun_temperature_error > noise
-    return start if remembered else start[:, :-1]
-
-
-@dataclass(frozen=True)
-class _GasStart:
-    """The temperature at which a gas without a thermometer begins, as physics bounds it [K].
-
-    Attributes
-    ----------
-    room, coldest, warmest : float
-        At rest, and what it can be.
-    std : float
-        Standard deviation before any data.
-    """
-
-    room: float
-    coldest: float
-    warmest: float
-    std: float
-
-    @classmethod
-    def of(cls, block: Block, prepared: Prepared) -> _GasStart | None:
-        """Start of a block's gas in a recording; None where it is measured, or there is no gas."""
-        if block.warm is None:
-            return None
-        pressures = [
-            block.channel,
-            *(n for n in block.drives if channel_of(n) == "supply_pressure"),
-        ]
-        gauges = [prepared.signals[n][0] for n in pressures if n in prepared.signals]
-        first = float(gauges[0][0])
-        bounds = block.warm.range_at(first, max(float(v.max()) for v in gauges))
-        wide = (bounds[1] - bounds[0]) / _START_DEVIATIONS
-        least = prepared.settings.begun_temperature_error
-        return cls(block.warm.room, *bounds, max(wide, least))
-
-
-class _FreedWindow(NamedTuple):
-    """A window freed of its start: directions that are taken out, what they take of the residual,
-    the temperature at which its gas begins [K], and how unlikely that is [standard deviations
-    squared].
-    """
-
-    basis: Array
-    taken: Array
-    begins: float | None = None
-    strain: float = 0.0
-
-
-def _freed_window(
-    columns: Array, value: Array, noise: float, gas: _GasStart | None, begins: float
-) -> _FreedWindow:
-    """A window's residual (n,) freed of what its start can do (n, k).
-
-    With a gas the last column is that of its temperature [1/K], of which the window begins at a
-    value: noise and a normal prior about the room's are whitened together, so that of an unlikely
-    start something stays in the residual; beyond what the temperature can be all of it stays.
-    """
-    free = columns if gas is None else columns[:, :-1]
-    q = np.linalg.qr(free)[0]
-    taken = q @ (q.T @ value)
-    if gas is None:
-        return _FreedWindow(q, taken)
-    column = columns[:, -1] - q @ (q.T @ columns[:, -1])
-    length = float(np.linalg.norm(column))
-    if not (0.0 < length < math.inf and math.isfinite(float(value @ value))):
-        return _FreedWindow(q, taken, begins)  # of a model that ran away
-    way, held = column / length, (noise / gas.std) ** 2
-    along = float(way @ (value - taken))
-    from_room = along + length * (begins - gas.room)  # in the residual, from the room's temperature
-    wanted = gas.room + length * from_room / (length**2 + held)
-    temperature = min(max(wanted, gas.coldest), gas.warmest)
-    past = from_room - length * (temperature - gas.room)
-    kept_in_residual = math.copysign(
-        math.hypot(past, (temperature - gas.room) * noise / gas.std), from_room
-    )
-    # how fast what is left grows with the residual
-    grows = (
-        past / kept_in_residual
-        if kept_in_residual and temperature != wanted
-        else held / (length**2 + held)
-    )
-    grows = grows if temperature != wanted else math.sqrt(held / (length**2 + held))
-    basis = np.column_stack([q, math.sqrt(max(0.0, 1.0 - grows)) * way])
-    strain = ((temperature - gas.room) / gas.std) ** 2
-    return _FreedWindow(basis, taken + (along - kept_in_residual) * way, temperature, strain)
-
-
-def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array) -> list[Array]:
-    """Change of a prediction by the level of each simulated drive and by how far it falls, and of a
-    temperature by a share of the wall's in what the thermometer reads; `core` is the rig as it was
-    in the recording.
-    """
-    # a wall is as warm as the room: a share of it makes what the gas does smaller by that share
-    columns = [prediction - float(np.mean(prediction))] if block.kind == "temperature" else []
-    for name in block.floating:
-        value, slope = prepared.signals[name]
-        # how far it falls goes with the valve's area over the tank's volume, which nobody knows
-        for off, steeper in ((np.ones_like(value), 0.0), (value - value[0], 1.0)):
-            step = 1e-3 * max(1.0, float(np.abs(value).max())) / max(1.0, float(np.abs(off).max()))
-            moved = prepared.with_signals(
-                {name: (value + step * off, slope * (1.0 + step * steeper))}
-            )
-            bare = replace(moved, recording=replace(moved.recording, parameters={}))
-            columns.append((predicted(block, core, bare) - prediction) / step)
-    return columns
-
-
-def _beside_starts(columns: list[Array], starts: list[tuple[int, int, Array]]) -> Array:
-    """Orthonormal columns (n, k) that are free in a whole recording, without what the starts of its
-    windows can do.
-    """
-    free, rounding = [], float(np.finfo(np.float64).eps) ** 0.5
-    for column in columns:
-        whole = float(np.linalg.norm(column))
-        for a, b, q in starts:
-            column[a:b] -= q @ (q.T @ column[a:b])
-        length = float(np.linalg.norm(column))
-        if length > rounding * whole:
-            free.append(column / length)
-    if not free:
-        return np.zeros((0, 0))
-    basis, triangle = np.linalg.qr(np.array(free).T)
-    return np.asarray(basis[:, np.abs(np.diag(triangle)) > rounding])
-
-
-def _with_slopes(
-    block: Block,
-    core: _core.Rig,
-    prepared: Prepared,
-    starts: list[int],
-    names: list[str],
-    given: Input | None,
-) -> tuple[Array, Array, Array]:
-    """A block's output over a recording (n,), its derivatives with respect to parameters and to the
-    states in which its windows start (n, k), and to the knots of an input (n, m).
-    """
-    prediction, jacobian = core.predict(
-        block.name,
-        prepared.driving(mechanical=block.mechanical),
-        prepared.dt,
-        default_step(prepared.dt, longest=block.step),
-        starts,
-        names,
-        signals_at_starts(block, prepared, starts),
-        prepared.n,
-        anchors=_anchors(block, prepared, starts),
-        **({} if given is None else given._asdict()),
-    )
-    if jacobian is None:
-        raise AssertionError("the core returns a jacobian when parameters are named")
-    ends = zip(starts, [*starts[1:], prepared.n], strict=True)
-    knots = 0 if given is None else max(given.knots(b - a) for a, b in ends)
-    split = jacobian.shape[1] - knots
-    return prediction, jacobian[:, :split], jacobian[:, split:]
-
-
-def _from_its_start(
-    block: Block,
-    core: _core.Rig,
-    prepared: Prepared,
-    starts: list[int],
-    names: list[str],
-    given: Input | None,
-) -> tuple[Prepared, Array, Array, Array]:
-    """Output and derivatives as of `_with_slopes`, of a gas that begins as warm as its pressure and
-    a prior say (Gauss-Newton), and the recording with that temperature.
-    """
-    gas = _GasStart.of(block, prepared)
-    with_slopes = _with_slopes(block, core, prepared, starts, names, given)
-    if gas is None:
-        return prepared, *with_slopes
-    first = slice(starts[0], [*starts[1:], prepared.n][0])
-    rows = prepared.usable(block.channel, block.drives, starts)[first]
-    measured = np.where(rows, prepared.recording.channels[block.channel][first], 0.0)
-    begins = gas.room
-    for _ in range(_START_STEPS):
-        prediction, jacobian, _ = with_slopes
-        start = np.where(rows[:, None], jacobian[first, len(names) :], 0.0)
-        columns = _start_columns(block, start, starts[0], prepared)
-        value = np.where(rows, measured - prediction[first], 0.0)
-        if columns.shape[1] < 2 or not np.isfinite(value).all():
-            break  # nothing of it is seen
-        wanted = _freed_window(columns, value, prepared.noise[block.channel], gas, begins).begins
-        if wanted is None or abs(wanted - begins) <= prepared.settings.begun_temperature_error:
-            break  # so far it is linear
-        begins = wanted
-        prepared = replace(prepared, temperatures={block.channel: begins})
-        with_slopes = _with_slopes(block, core, prepared, starts, names, given)
-    return prepared, *with_slopes
-
-
-def residual(
-    block: Block,
-    core: _core.Rig,
-    prepared: Prepared,
-    parameters: list[str],
-    given: Input | None = None,
-) -> Residual:
-    """Predict a block's output over a recording and compare.
-
-    Parameters
-    ----------
-    block : Block
-        Which block.
-    core : _core.Rig
-        The compiled model.
-    prepared : Prepared
-        The recording.
-    parameters : list of str
-        Dotted names for the jacobian, may be empty.
-    given : Input, optional
-        An input of the block beside what its model makes; the residual then has a `response`.
-    """
-    core = _core_of_recording(core, prepared)
-    starts = prepared.starts(block.window, block.drives)
-    # without parameters a free null direction is still wanted for the window's start: ask for one
-    # parameter
-    given_own = [n for n, v in prepared.recording.parameters.items() if v.error == "own"]
-    own_free = [n for n in given_own if n in core.parameter_names]
-    names = list(dict.fromkeys([*parameters, *own_free])) or [
-        next(
-            (n for n in core.parameter_names if n.endswith("pressure_zero")),
-            core.parameter_names[0],
-        )
-    ]
-    prepared, prediction, jacobian, response = _from_its_start(
-        block, core, prepared, starts, names, given
-    )
-    free = jacobian[:, [names.index(n) for n in own_free]].T.copy()
-    for name, value_of in prepared.recording.parameters.items():
-        if name in parameters:
-            jacobian[:, names.index(name)] *= value_of.slope
-    rows = prepared.usable(block.channel, block.drives, starts)
-    measured = prepared.recording.channels[block.channel]
-    value = np.where(rows, measured - prediction, 0.0)
-    slopes = np.where(rows[:, None], np.hstack([jacobian[:, : len(names)], response]), 0.0)
-    columns = np.where(rows[:, None], jacobian[:, len(names) :], 0.0)
-    not_freed = Residual(value, None, prediction, rows, prepared.noise[block.channel])
-    freed = _freed_of_starts(block, prepared, not_freed, starts, columns, slopes)
-    every = [*_levels(block, core, prepared, prediction), *free]
-    of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], freed.starts)
-    if of_recording.size:
-        taken = of_recording @ (of_recording.T @ freed.value)
-        slopes -= of_recording @ (of_recording.T @ slopes)
-        freed = replace(
-            freed,
-            value=freed.value - taken,
-            prediction=freed.prediction + taken,
-            starts=[*freed.starts, (0, prepared.n, of_recording)],
-        )
+    if count == 1:
+        return recording
+    half = count // 2
+    size = (len(recording) - half) // count
+    if size < 2:
+        return recording
+    channels: dict[str, Array] = {}
+    masks: dict[str, Mask] = {}
+    commands: dict[str, Array] = {}
+    for name, values in recording.channels.items():
+        first = half if channel_of(name) in _HELD else 0
+        rows = slice(first, first + size * count)
+        good = recording.mask[name][rows].reshape(size, count)
+        if channel_of(name) in DRIVEN_COMMANDS and good.any():
+            commands[name] = held(values, recording.mask[name])[rows]
+        parts = np.where(good, values[rows].reshape(size, count), 0.0)
+        usable = 2 * good.sum(axis=1) > count
+        means = parts.sum(axis=1) / np.maximum(good.sum(axis=1), 1)
+        channels[name], masks[name] = np.where(usable, means, np.nan), usable
+    step = count * recording.sample_time
     return replace(
-        freed,
-        jacobian=slopes[:, : len(parameters)] if parameters else None,
-        # a whole recording is shown from its measured start, a window from the one that suits best
-        prediction=prediction if block.window is None else freed.prediction,
-        response=None if given is None else slopes[:, len(names) :],
-    )
-
-
-def _freed_of_starts(
-    block: Block,
-    prepared: Prepared,
-    not_freed: Residual,
-    starts: list[int],
-    columns: Array,
-    slopes: Array,
-) -> Residual:
-    """A residual freed of where its windows start, and so are `slopes` (n, k), in place; windows
-    with too few rows are left out. ``columns`` are what the start of each window does.
-    """
-    value, rows, shifted = not_freed.value, not_freed.rows, not_freed.prediction.copy()
-    gas = _GasStart.of(block, prepared)
-    begins = prepared.temperatures.get(block.channel, gas.room) if gas else 0.0
-    temperature, strain = (begins if gas else None), 0.0
-    bases: list[tuple[int, int, Array]] = []
-    for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
-        start = _start_columns(block, columns[a:b], a, prepared)
-        if np.count_nonzero(rows[a:b]) < WINDOW_SAMPLES_PER_STATE * start.shape[1]:
-            rows[a:b], value[a:b], slopes[a:b] = False, 0.0, 0.0
-            continue
-        first_gas = gas if a == starts[0] and start.shape[1] > 1 else None
-        freed = _freed_window(start, value[a:b], not_freed.noise, first_gas, begins)
-        bases.append((a, b, freed.basis))
-        value[a:b] -= freed.taken
-        shifted[a:b] += freed.taken
-        slopes[a:b] -= freed.basis @ (freed.basis.T @ slopes[a:b])
-        strain += freed.strain
-        temperature = freed.begins or temperature
-    return replace(
-        not_freed, prediction=shifted, starts=bases, temperature=temperature, strain=strain
+        recording,
+        time=np.arange(size, dtype=np.float64) * step,
+        sample_time=step,
+        channels=channels,
+        mask=masks,
+        commands=commands,
     )

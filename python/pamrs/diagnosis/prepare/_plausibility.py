@@ -1,4 +1,4 @@
-"""Checks of recordings before any fit: units, swapped columns and dead sensors.
+"""Evidence against recordings before any fit: units, swapped columns and dead sensors.
 
 A mismatch that a wrong heading makes is not physics. What is looked at needs no fit: sizes against
 the rig file, the order of pressures, the range of joints, the sense in which a pressure follows its
@@ -19,10 +19,11 @@ import numpy as np
 from pamrs import _core
 from pamrs._arrays import Array, Mask, stretches
 from pamrs.channels import block_of, channel_of, dotted, unit_of, with_trait
-from pamrs.diagnosis.prepare._blocks import Block, predicted
+from pamrs.diagnosis.prepare._blocks import Block
+from pamrs.diagnosis.prepare._residual import predicted
 from pamrs.diagnosis.prepare._signals import Prepared, moves_by_gauges
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.errors import DiagnosisError, SimulationError, joined
+from pamrs.errors import SimulationError
 from pamrs.findings import Faulty
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
@@ -78,81 +79,8 @@ _SENSE_RIGHT = 0.4
 
 _PRESSURE_CHANNELS = with_trait("pressure")
 _DEGREES = 180.0 / math.pi  # of a radian
-_MOST_ITEMS = 12
-"""Findings that a message lists."""
-
-
-def check_plausible(
-    recordings: Sequence[Recording], rig: Rig, case: str, settings: DiagnosisSettings
-) -> None:
-    """Refuse recordings whose units or columns cannot be right.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        As loaded.
-    rig : Rig
-        The nominal model.
-    case : str
-        Name of the case, for the message.
-    settings : DiagnosisSettings
-        What is allowed.
-
-    Raises
-    ------
-    DiagnosisError
-        With every finding: recording, channel, what was found, what is allowed.
-    """
-    findings = [
-        f"recording {r.name!r}: {text}"
-        for r in recordings
-        for text in implausible(r, rig, settings)
-    ]
-    _refuse(case, findings)
-
-
-def _refuse(case: str, findings: list[str]) -> None:
-    if not findings:
-        return
-    lines = findings[:_MOST_ITEMS] + (
-        [f"and {len(findings) - _MOST_ITEMS} more of this kind"]
-        if len(findings) > _MOST_ITEMS
-        else []
-    )
-    raise DiagnosisError(
-        joined(f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", lines)
-    )
-
-
-def implausible(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> list[str]:
-    """Everything about a recording that cannot be, in words.
-
-    Parameters
-    ----------
-    recording : Recording
-        SI values with masks.
-    rig : Rig
-        The nominal model.
-    settings : DiagnosisSettings
-        What is allowed.
-
-    Returns
-    -------
-    list of str
-        One line for each finding; empty for a sound recording.
-    """
-    return [
-        *_clock(recording, rig, settings),
-        *_pressures(recording, rig, settings),
-        *_frozen_tanks(recording, rig),
-        *_order(recording, rig),
-        *_motion(recording, rig, settings),
-        *_valves(recording, rig),
-        *(
-            f"{finding}: a command that was not logged; map the right column, or leave this one out"
-            for finding in _dead_commands(recording, rig).values()
-        ),
-    ]
+_MOST_SPANS = 12
+"""Stretches that a message lists."""
 
 
 def without_impossible(
@@ -160,7 +88,7 @@ def without_impossible(
 ) -> tuple[list[Recording], list[str]]:
     """Recordings whose samples beyond what the rig allows are masked, so that nothing starts there.
 
-    A recording that is beyond it for long is refused before (:func:`check_plausible`).
+    A recording that is beyond it for long is left out before.
 
     Parameters
     ----------
@@ -238,9 +166,9 @@ def _when(bad: Mask, recording: Recording) -> str:
     """The first stretches in which something is, in seconds."""
     pairs = stretches(bad)
     spans = [
-        f"{recording.time[a]:.4g} to {recording.time[b - 1]:.4g} s" for a, b in pairs[:_MOST_ITEMS]
+        f"{recording.time[a]:.4g} to {recording.time[b - 1]:.4g} s" for a, b in pairs[:_MOST_SPANS]
     ]
-    more = f" and {len(pairs) - _MOST_ITEMS} more stretches" if len(pairs) > _MOST_ITEMS else ""
+    more = f" and {len(pairs) - _MOST_SPANS} more stretches" * (len(pairs) > _MOST_SPANS)
     return ", ".join(spans) + more
 
 
@@ -256,7 +184,7 @@ def _values(recording: Recording, name: str) -> Array:
     return np.asarray(recording.channels[name][recording.mask[name]], dtype=np.float64)
 
 
-def _clock(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
+def slow_clock(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
     """Finding on a sample time that is too long for motion to be followed."""
     longest = settings.longest_sample_time
     if _moving(rig, settings) and recording.sample_time > longest:
@@ -267,7 +195,9 @@ def _clock(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Itera
         )
 
 
-def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
+def impossible_pressures(
+    recording: Recording, rig: Rig, settings: DiagnosisSettings
+) -> Iterator[str]:
     """Findings on sizes of pressures, alone and against the rig file or a regulator's command."""
     rated = {
         dotted("supply_pressure", supply): set_to
@@ -347,7 +277,7 @@ def _set_pressure(recording: Recording, rig: Rig, supply: str) -> tuple[float, s
     return (float(np.quantile(known, _COMMAND_QUANTILE)), command) if known.size else None
 
 
-def _frozen_tanks(recording: Recording, rig: Rig) -> Iterator[str]:
+def frozen_tanks(recording: Recording, rig: Rig, _: DiagnosisSettings) -> Iterator[str]:
     """Findings on tanks that read one value although they are drawn from."""
     valves = rig.ports("valve")
     for supply, table in rig.tables("supply").items():
@@ -386,7 +316,7 @@ def fed_by(rig: Rig) -> dict[str, list[str]]:
     return suppliers
 
 
-def _order(recording: Recording, rig: Rig) -> Iterator[str]:
+def swapped_pressures(recording: Recording, rig: Rig, _: DiagnosisSettings) -> Iterator[str]:
     """Findings on muscles above their supply's pressure, and regulators above their inlet's."""
     fed = {
         dotted("muscle_pressure", chamber): suppliers for chamber, suppliers in fed_by(rig).items()
@@ -480,7 +410,7 @@ def _moving(rig: Rig, settings: DiagnosisSettings) -> list[_Moving]:
     return moving
 
 
-def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
+def impossible_motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
     """Findings on range, rate and life of joint angles and of a load's length."""
     for moving in _moving(rig, settings):
         name, unit = moving.channel, moving.unit
@@ -538,7 +468,7 @@ def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iter
             )
 
 
-def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
+def reversed_valves(recording: Recording, rig: Rig, _: DiagnosisSettings) -> Iterator[str]:
     """Findings on commands outside the valve's range, and on pressures that go against them."""
     still_by = {"joint_angle": _STILL_ANGLE, "length": _STILL_LENGTH}
     inlets = {dotted("line", name): e["to"] for name, e in rig.ports("line").items()}
@@ -650,6 +580,14 @@ def _dead_commands(recording: Recording, rig: Rig) -> dict[str, str]:
     return evidence
 
 
+def unlogged_commands(recording: Recording, rig: Rig, _: DiagnosisSettings) -> Iterator[str]:
+    """Findings on commands of one value that were not logged."""
+    for finding in _dead_commands(recording, rig).values():
+        yield (
+            f"{finding}: a command that was not logged; map the right column, or leave this one out"
+        )
+
+
 def without_dead_commands(
     recordings: Sequence[Recording], rig: Rig
 ) -> tuple[list[Recording], list[Faulty]]:
@@ -668,7 +606,7 @@ def without_dead_commands(
     Returns
     -------
     recordings : list of Recording
-        As they were where nothing could be judged otherwise, for :func:`check_plausible`.
+        As they were where nothing could be judged otherwise.
     faults : list of Faulty
         Each command that was not logged.
     """
@@ -689,7 +627,7 @@ def without_dead_commands(
                 f"{', '.join(gone)} cannot be judged with the others without it",
             )
         else:
-            recordings_left = [_without(r, command) for r in recordings_left]
+            recordings_left = [without_channel(r, command) for r in recordings_left]
             done = "what it drives is not judged"
         text = f"{next(iter(dead.values()))}: it was not logged; {done}"
         faults.append(Faulty(command, "not_logged", text))
@@ -702,42 +640,19 @@ def _moves(recording: Recording, channel: str) -> bool:
     return bool(values.size) and float(np.ptp(values)) > 0.0
 
 
-def _without(recording: Recording, channel: str) -> Recording:
+def without_channel(recording: Recording, channel: str) -> Recording:
     """A recording without a channel."""
     channels, mask = dict(recording.channels), dict(recording.mask)
     del channels[channel], mask[channel]
     return replace(recording, channels=channels, mask=mask)
 
 
-def check_sense(
-    blocks: Sequence[Block], recordings: Sequence[Prepared], core: _core.Rig, case: str
-) -> None:
-    """Refuse joint angles that are the model's own in another unit, and angles and lengths that go
-    the opposite way throughout.
-
-    Parameters
-    ----------
-    blocks : sequence of Block
-        Those whose output is an angle or a length are looked at.
-    recordings : sequence of Prepared
-        Recordings with drives.
-    core : _core.Rig
-        The nominal rig, compiled.
-    case : str
-        Name of the case, for the message.
-
-    Raises
-    ------
-    DiagnosisError
-        With every finding.
-    """
-    _refuse(case, turned_about(blocks, recordings, core))
-
-
 def turned_about(
     blocks: Sequence[Block], recordings: Sequence[Prepared], core: _core.Rig
 ) -> list[str]:
-    """Findings of :func:`check_sense`, one for each recording, where most of them have one."""
+    """Findings on angles that are the model's own in another unit, and on angles and lengths that
+    go the opposite way throughout: one for each recording, where most of them have one.
+    """
     findings = []
     for block in (b for b in blocks if channel_of(b.channel) in ("joint_angle", "length")):
         for prepared in recordings:

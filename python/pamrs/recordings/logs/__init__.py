@@ -15,16 +15,19 @@ from typing import Final, NamedTuple
 from pamrs._files import check_regular
 from pamrs.errors import MissingPackageError, PamrsError, RecordingError
 from pamrs.recordings._gate import check_size
-from pamrs.recordings.logs._hdf import read_hdf
-from pamrs.recordings.logs._json import read_json
-from pamrs.recordings.logs._log import Log, Series, TextFormat, switched, table_of
-from pamrs.recordings.logs._matlab import read_matlab
-from pamrs.recordings.logs._measurement import read_mdf, read_tdms
-from pamrs.recordings.logs._ros import read_bag, read_mcap
-from pamrs.recordings.logs._sheets import read_sheets
-from pamrs.recordings.logs._tables import read_arrow, read_numpy
-from pamrs.recordings.logs._text import read_text_log
-from pamrs.recordings.logs._words import Written, split_heading, understood_unit
+from pamrs.recordings.logs._arrays import read_arrow, read_hdf, read_matlab, read_numpy
+from pamrs.recordings.logs._log import (
+    Log,
+    Series,
+    TextFormat,
+    Written,
+    split_heading,
+    switched,
+    table_of,
+    understood_unit,
+)
+from pamrs.recordings.logs._recorders import read_bag, read_mcap, read_mdf, read_tdms
+from pamrs.recordings.logs._text import read_json, read_sheets, read_text_log
 
 __all__ = [
     "ENDINGS",

@@ -1,33 +1,49 @@
-"""Text logs in every dialect: encoding, comments, headings, units and decimals are found out."""
+"""Logs of cells: text in every dialect (encoding, comments, headings, units and decimals are found
+out), JSON (records in an array or in lines, columns in a table, which may lie deeper), and
+workbooks of Excel by calamine, each sheet that holds a table.
+"""
 
 from __future__ import annotations
 
+import io
+import json
 import math
 import re
-from collections.abc import Callable, Sequence
+import struct
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from datetime import date, datetime, time, timedelta
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from pamrs._files import MOST_BYTES, read_file
 from pamrs.errors import RecordingError
-from pamrs.recordings._dates import is_date, is_moment, moments
-from pamrs.recordings._stamps import CLOCK_WORDS
-from pamrs.recordings.dialect import (
+from pamrs.recordings._clock import CLOCK_WORDS, is_date, is_moment, moments
+from pamrs.recordings._gate import check_size
+from pamrs.recordings.logs._log import (
+    Log,
+    Series,
+    TextFormat,
+    collected,
+    same_unit,
+    series_of_texts,
+    split_heading,
+    understood_unit,
+    unwrapped,
+)
+from pamrs.recordings.table import (
     BESIDE_COMMAS,
+    NO_VALUE,
     QUANTITY,
     Dialect,
+    Lines,
+    Table,
     dialect_of,
     is_number,
     is_useful,
-)
-from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, series_of_texts
-from pamrs.recordings.logs._words import same_unit, split_heading, understood_unit, unwrapped
-from pamrs.recordings.table import (
-    NO_VALUE,
-    Lines,
-    Table,
     joined_rows,
     lines_of,
     lines_of_rows,
@@ -101,15 +117,15 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
         remarks.append("exponents are written with D, as Fortran does: read")
     times: list[str] | None = None
     if form.delimiter is None:
-        apart = times_apart(lines, source)
+        apart = _times_apart(lines, source)
         if apart is not None:
             lost = len(lines) - len(apart[0])
             remarks += [f"lines without a time: {lost}, left out"] if lost else []
             times, lines = apart
-        labelled = labelled_rows(lines, times, source)
+        labelled = _labelled_rows(lines, times, source)
         if labelled is not None:
             rows = lines_of_rows(labelled[0])
-            return log_of_lines(path, rows, form, ".", [*remarks, *labelled[1]])
+            return _log_of_lines(path, rows, form, ".", [*remarks, *labelled[1]])
     kept = [line for line in lines if not line.lstrip().startswith(_COMMENTS)]
     dialect = dialect_of(kept, source, form.delimiter, form.decimal, form.thousands)
     if times is not None:
@@ -119,10 +135,10 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
         lines = text.splitlines()
     comments = _comments(lines, dialect)
     body = lines_of(text, dialect.delimiter, source, _COMMENTS)
-    return log_of_lines(path, body, form, dialect.decimal, remarks, comments)
+    return _log_of_lines(path, body, form, dialect.decimal, remarks, comments)
 
 
-def log_of_lines(
+def _log_of_lines(
     path: Path,
     body: Lines,
     form: TextFormat,
@@ -130,32 +146,7 @@ def log_of_lines(
     remarks: Sequence[str] = (),
     comments: Sequence[list[str]] = (),
 ) -> Log:
-    """The log of a table, with what stands above it.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    body : Lines
-        Its rows.
-    form : TextFormat
-        What is given of it.
-    decimal : str
-        Decimal mark.
-    remarks : sequence of str
-        What was said of it before.
-    comments : sequence of list of str
-        Cells of the comments above it, which may be headings.
-
-    Returns
-    -------
-    Log
-
-    Raises
-    ------
-    RecordingError
-        If it is no table of numbers.
-    """
+    """Log of a table, with what stands above it: cells of comments may be headings."""
     above = _headed(path, body, decimal, form, comments)
     rows = body.after(above.first)
     if len(rows.lines) < 2:
@@ -549,26 +540,8 @@ _PAIR: Final = re.compile(
 _MOST: Final = 0.8  # of the lines look so
 
 
-def times_apart(lines: Sequence[str], source: str) -> tuple[list[str], list[str]] | None:
-    """Split lines like ``10:16:51.123 -> 5.00,152057`` into the time and the rest.
-
-    Parameters
-    ----------
-    lines : sequence of str
-        All lines.
-    source : str
-        The file, for messages.
-
-    Returns
-    -------
-    times, rests : list of str
-        Of the lines that have a time; None where most have none.
-
-    Raises
-    ------
-    RecordingError
-        If lines are of several measurements, whose fields would be taken for one.
-    """
+def _times_apart(lines: Sequence[str], source: str) -> tuple[list[str], list[str]] | None:
+    """Times and rests of lines like ``10:16:51.123 -> 5.00,15``; None where most have no time."""
     middle = lines[len(lines) // 2 :][:100]
     for form in _APART:
         if sum(form.fullmatch(line) is not None for line in middle) < _MOST * max(len(middle), 1):
@@ -597,33 +570,14 @@ def _pairs(line: str) -> list[tuple[str, str, str]] | None:
     return found
 
 
-def labelled_rows(
+def _labelled_rows(
     lines: Sequence[str], times: Sequence[str] | None, source: str
 ) -> tuple[list[list[str]], list[str]] | None:
-    """Rows of lines like ``t:0.02,u:7.00,p:1.5 bar``.
+    """Headings and rows of lines like ``t:0.02,u:7.00,p:1.5 bar``, and what was left out; None for
+    lines of which most are not so.
 
-    Parameters
-    ----------
-    lines : sequence of str
-        All lines.
-    times : sequence of str, optional
-        What stood before the arrow of each; the first column then.
-    source : str
-        The file, for messages.
-
-    Returns
-    -------
-    rows : list of list of str
-        Headings, then rows, each of which ends where a label comes again; empty where a label is
-        missing.
-    remarks : list of str
-        What was left out.
-    None where most lines are not so.
-
-    Raises
-    ------
-    RecordingError
-        If a label has several units.
+    A row ends where a label comes again, and has an empty cell where one is missing. Times that
+    stood before an arrow in each line are the first column.
     """
     middle = lines[len(lines) // 2 :][:100]
     if sum(_pairs(line) is not None for line in middle) < _MOST * max(len(middle), 1):
@@ -653,3 +607,255 @@ def labelled_rows(
             filled.add(name)
             rows[-1][len(before) + place[name]] = value.replace(",", ".")
     return rows, told_rows(strange, "lines without labels and numbers")
+
+
+def read_json(path: Path, form: TextFormat) -> Log:
+    """Read a JSON file.
+
+    Parameters
+    ----------
+    path : Path
+        ``.json``, ``.jsonl`` or ``.ndjson``; ``.gz`` is unpacked.
+    form : TextFormat
+        Its `columns` hold; the rest JSON says itself.
+
+    Returns
+    -------
+    Log
+        One series for each key; the keys of a path are joined by ``/``.
+
+    Raises
+    ------
+    RecordingError
+        If it is broken, or holds no table.
+    """
+    text = read_text(path)
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError:
+        lines = enumerate(text.splitlines(), start=1)
+        content = [_loaded(path, number, line) for number, line in lines if line.strip()]
+    said: list[str] = []
+    rows = _rows(content, said)
+    if not any(rows):
+        raise RecordingError(f"{path}: no table was found: neither a list of records nor columns")
+    check_size(len(rows), sum(map(len, rows)), str(path), len(rows[0]))
+    body = lines_of_rows([_json_text(each) for each in row] for row in rows)
+    return _log_of_lines(path, body, form, ".", said)
+
+
+def _loaded(path: Path, number: int, line: str) -> Any:
+    try:
+        return json.loads(line)
+    except json.JSONDecodeError as error:
+        raise RecordingError(f"{path}: line {number}, column {error.colno}: {error.msg}") from error
+
+
+def _rows(content: Any, remarks: list[str]) -> list[list[Any]]:
+    """Headings and rows of the first table in what was read, without cells where there is none."""
+    if isinstance(content, list) and any(isinstance(each, Mapping) for each in content):
+        flat = [_flat(each) for each in content if isinstance(each, Mapping)]
+        names = list(dict.fromkeys(name for each in flat for name in each))
+        return [names, *([each.get(name) for name in names] for each in flat)]
+    if isinstance(content, list):
+        return content if all(isinstance(each, list) for each in content) else []
+    if not isinstance(content, Mapping):
+        return []
+    inner = [each for each in content.values() if isinstance(each, Mapping)]
+    alike = len(inner) == len(content) and all(set(each) == set(inner[0]) for each in inner)
+    if alike and not any(isinstance(v, (Mapping, list)) for each in inner for v in each.values()):
+        content = {name: list(each.values()) for name, each in content.items()}  # as pandas has it
+    lists = {name: each for name, each in _flat(content).items() if isinstance(each, list)}
+    for each in filter(None, lists.values()):
+        if isinstance(each[0], (Mapping, list)) and any(rows := _rows(each, remarks)):
+            heads = content.get("columns")
+            return [heads, *rows] if isinstance(heads, list) and rows is each else rows
+    counts = [len(each) for each in lists.values() if each]
+    usual = max(counts, key=counts.count, default=0)
+    others = [f"{name} ({len(each)})" for name, each in lists.items() if len(each) != usual]
+    if others:
+        remarks.append(f"left out: {', '.join(others)}: the rest have {usual} values each")
+    columns = {name: each for name, each in lists.items() if len(each) == usual}
+    return [list(columns), *map(list, zip(*columns.values(), strict=True))] if columns else []
+
+
+def _flat(record: Any, before: str = "") -> dict[str, Any]:
+    """Values of a record and of the records in it, by the keys of their paths."""
+    if not isinstance(record, Mapping):
+        return {before: record}
+    found: dict[str, Any] = {}
+    for key, value in record.items():
+        found |= _flat(value, f"{before}/{key}" if before else str(key))
+    return found
+
+
+def _json_text(value: Any) -> str:
+    """A value as a text file has it."""
+    if value is None or isinstance(value, str):
+        return (value or "").strip()
+    return json.dumps(value)
+
+
+_COMMA: Final = re.compile(r"[-+]?\d+,\d+")
+_CELL: Final = re.compile(rb'<(?:\w+:)?(?:c|row)\b[^>]*?\br="([A-Z]{0,7})(\d{1,9})"')
+_BLOCK: Final = 1 << 20
+_OVERLAP: Final = 400  # bytes of a tag, at most
+#: Records of a sheet of Excel 97 that begin with the row and column of a cell.
+_OF_CELLS: Final = frozenset((0x06, 0x7E, 0xBD, 0xBE, 0xD6, 0xFD, *range(0x201, 0x206), 0x27E))
+
+
+def read_sheets(path: Path, form: TextFormat) -> Log:
+    """Read a workbook.
+
+    Parameters
+    ----------
+    path : Path
+        ``.xlsx``, ``.xlsm`` or ``.xls``.
+    form : TextFormat
+        Its `columns`, `header` and `thousands` hold for every sheet.
+
+    Returns
+    -------
+    Log
+        One series for each column; ``sheet/column`` where several sheets hold a table.
+
+    Raises
+    ------
+    RecordingError
+        If no sheet holds a table, or the workbook has more than can be read.
+    """
+    tables: dict[str, Log] = {}
+    unread: dict[str, str] = {}
+    for name, cells in _sheets(path).items():
+        rows, commas = _texts(cells)
+        said = [f"numbers that are texts with a decimal comma: {commas}, read"] if commas else []
+        try:
+            tables[name] = _log_of_lines(path, lines_of_rows(rows), form, ".", said)
+        except RecordingError as error:
+            unread[f"sheet {name}"] = str(error).removeprefix(f"{path}: ")
+    found: list[Series] = []
+    remarks: list[str] = []
+    for name, log in tables.items():
+        before = f"{name}/" if len(tables) > 1 else ""
+        found += [replace(item, name=before + item.name) for item in log.series.values()]
+        unread |= {before + key: why for key, why in log.unread.items()}
+        remarks += [before + text for text in log.remarks]
+    log = collected(path, found, unread, remarks)
+    return replace(log, tables=tuple(f"{name}/" for name in tables) if len(tables) > 1 else ())
+
+
+def _sheets(path: Path) -> dict[str, list[list[Any]]]:
+    """Cells of all sheets; what is too large for memory is refused before it is unpacked."""
+    from python_calamine import CalamineWorkbook
+
+    data = read_file(path)
+    if zipfile.is_zipfile(io.BytesIO(data)):
+        _check_packed(path, data)
+    else:
+        _check_records(path, data)
+    try:
+        book = CalamineWorkbook.from_filelike(io.BytesIO(data))
+        return {name: book.get_sheet_by_name(name).to_python() for name in book.sheet_names}
+    except BaseException as error:  # a panic of its Rust is no Exception
+        if isinstance(error, (KeyboardInterrupt, MemoryError)):
+            raise
+        raise RecordingError(f"{path}: cannot be read ({str(error)[:200]})") from error
+
+
+def _check_packed(path: Path, data: bytes) -> None:
+    """Refuse a workbook that unpacks to more than is read, or whose sheets have far cells."""
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        total = sum(item.file_size for item in packed.infolist())
+        if total > MOST_BYTES:
+            raise RecordingError(
+                f"{path}: unpacked it has {total >> 20} MB; at most {MOST_BYTES >> 20} MB are read"
+            )
+        for item in packed.infolist():
+            if item.filename.startswith("xl/worksheets/") and item.filename.endswith(".xml"):
+                columns, last, left, rest = {b""}, 0, MOST_BYTES, b""
+                with packed.open(item) as stream:
+                    while left > 0 and (block := stream.read(_BLOCK)):
+                        left -= len(block)
+                        for column, row in _CELL.findall(rest + block):
+                            columns.add(column)
+                            last = max(last, int(row))
+                        rest = block[-_OVERLAP:]
+                width = max(map(_column_number, columns))
+                check_size(last, last * width, f"{path}: {item.filename}")
+
+
+def _column_number(letters: bytes) -> int:
+    number = 0
+    for letter in letters:
+        number = 26 * number + letter - 64
+    return number
+
+
+def _check_records(path: Path, data: bytes) -> None:
+    """Refuse a workbook of Excel 97 whose sheets have cells that are far out."""
+    rows, columns = 0, 0
+    for stream in _streams(data):
+        place = 0
+        while place + 4 <= len(stream):
+            kind, size = struct.unpack_from("<HH", stream, place)
+            if kind in _OF_CELLS and size >= 4 and place + 8 <= len(stream):
+                row, column = struct.unpack_from("<HH", stream, place + 4)
+                rows, columns = max(rows, row + 1), max(columns, column + 1)
+            place += 4 + size
+    check_size(rows, rows * columns, str(path))
+
+
+def _streams(data: bytes) -> list[bytes]:
+    """Streams of a compound file that are named like a workbook; else the bytes themselves."""
+    if data[:8] != bytes.fromhex("d0cf11e0a1b11ae1") or len(data) < 512:
+        return [data]
+    shift = struct.unpack_from("<H", data, 30)[0]
+    size = 1 << min(shift, 16)
+    blocks = [data[at : at + size] for at in range(size, len(data), size)]
+    listed = struct.unpack_from("<109I", data, 76)
+    table = b"".join(blocks[block] for block in listed if block < len(blocks))
+    following = struct.unpack(f"<{len(table) // 4}I", table[: len(table) // 4 * 4])
+
+    def chain(block: int) -> bytes:
+        found, seen = [], 0
+        while block < len(blocks) and block < len(following) and seen <= len(blocks):
+            found.append(blocks[block])
+            block, seen = following[block], seen + 1
+        return b"".join(found)
+
+    folder = chain(struct.unpack_from("<I", data, 48)[0])
+    streams = []
+    for at in range(0, len(folder) - 127, 128):
+        name = folder[at : at + 64].decode("utf-16-le", errors="replace").split("\0")[0]
+        if name in ("Workbook", "Book"):
+            streams.append(chain(struct.unpack_from("<I", folder, at + 116)[0]))
+    return streams
+
+
+def _texts(cells: list[list[Any]]) -> tuple[list[list[str]], int]:
+    """Cells as texts, and how many were texts of numbers with a decimal comma."""
+    commas = 0
+    rows = []
+    for row in cells:
+        texts = [_cell_text(cell) for cell in row]
+        for place, text in enumerate(texts):
+            if isinstance(row[place], str) and _COMMA.fullmatch(text):
+                texts[place] = text.replace(",", ".")
+                commas += 1
+        rows.append(texts)
+    return rows, commas
+
+
+def _cell_text(cell: Any) -> str:
+    """A cell as a text file has it."""
+    if isinstance(cell, bool):
+        return str(int(cell))
+    if isinstance(cell, datetime):
+        return f"{cell:%Y-%m-%d %H:%M:%S.%f}"
+    if isinstance(cell, date):
+        return f"{cell:%Y-%m-%d} 00:00:00"
+    if isinstance(cell, time):
+        return f"{cell:%H:%M:%S.%f}"
+    if isinstance(cell, timedelta):
+        return repr(cell.total_seconds())
+    return cell.strip() if isinstance(cell, str) else repr(cell)

@@ -1,22 +1,292 @@
-"""MATLAB's files of every version by mat-io: arrays, structs, Simulink's logs, ControlDesk's."""
+"""Files of arrays: HDF5 by h5py, Parquet and Feather by pyarrow, those of NumPy, and those of
+MATLAB, of every version, by mat-io: structs, logs of Simulink and ControlDesk.
+"""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from pamrs._arrays import Array
+from pamrs._files import MOST_DEPTH, MOST_PARTS
 from pamrs.errors import RecordingError
-from pamrs.recordings._gate import Gate, admit_matlab
-from pamrs.recordings.logs._hdf import leads_elsewhere, members
-from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, numbers_of
-from pamrs.recordings.logs._tables import series_of_matrix
-from pamrs.recordings.logs._words import understood_unit
+from pamrs.recordings._gate import Gate, admit_arrow, admit_matlab, admit_numpy
+from pamrs.recordings.logs._log import (
+    Log,
+    Series,
+    TextFormat,
+    collected,
+    numbers_of,
+    series_of_texts,
+    split_heading,
+    understood_unit,
+)
 from pamrs.units import parse_unit, same_dimension
+
+
+def read_arrow(path: Path, form: TextFormat) -> Log:
+    """Read a Parquet or Feather file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; ``.parquet``, else Feather (Arrow's file format, of either version).
+    form : TextFormat
+        Not used: these files say what is in them.
+
+    Returns
+    -------
+    Log
+        A series for each column of numbers, flags, durations or date-times.
+    """
+    import pyarrow.feather
+    import pyarrow.parquet
+
+    admit_arrow(path)
+    if path.suffix.lower() == ".parquet":
+        table = pyarrow.parquet.read_table(path)
+    else:
+        table = pyarrow.feather.read_table(path)
+    found: list[Series] = []
+    unread: dict[str, str] = {}
+    for column in table.schema:
+        name, unit = split_heading(column.name)
+        said = (column.metadata or {}).get(b"unit")
+        kept = table.column(column.name)
+        values = numbers_of(kept.to_numpy())
+        if values is None:
+            found.append(series_of_texts(name, [str(item) for item in kept.to_pylist()], unit))
+            continue
+        stamps = str(column.type).startswith(("timestamp", "duration", "time"))
+        if stamps:
+            unit = "s"
+        found.append(Series(name, values, said.decode() if said else unit, stamps=stamps))
+    return collected(path, found, unread)
+
+
+def read_numpy(path: Path, form: TextFormat) -> Log:
+    """Read a ``.npy`` or ``.npz`` file; nothing in it is executed.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    form : TextFormat
+        Its `columns` name the columns of a matrix.
+
+    Returns
+    -------
+    Log
+        A series for each vector, each column of a matrix, each field of records.
+    """
+    admit_numpy(path)
+    content = np.load(path, allow_pickle=False)
+    found: list[Series] = []
+    unread: dict[str, str] = {}
+    if isinstance(content, np.ndarray):
+        found += _series_of_matrix("", content, form.columns, unread, path)
+    else:
+        with content:
+            for name in content.files:
+                found += _series_of_matrix(name, content[name], form.columns, unread, path)
+    return collected(path, found, unread)
+
+
+def _series_of_matrix(
+    heading: str, array: Any, columns: tuple[str, ...] | None, unread: dict[str, str], path: Path
+) -> list[Series]:
+    """Series of one array: a vector, the columns of a matrix, the fields of records.
+
+    Samples run along the longer axis; `unread` gets what is none of these, with the reason.
+    """
+    name, unit = split_heading(heading)
+    values = np.asarray(array)
+    if values.dtype.names:
+        found: list[Series] = []
+        for part in values.dtype.names:
+            inside = f"{heading}/{part}" if heading else part
+            found += _series_of_matrix(inside, values[part], None, unread, path)
+        return found
+    values = np.squeeze(values)
+    if values.ndim not in (1, 2) or values.size < 2:
+        unread[name or "the array"] = f"it has the shape {np.shape(array)}"
+        return []
+    if values.ndim == 1:
+        numbers = numbers_of(values)
+        if numbers is None:
+            unread[name] = "it holds no numbers"
+            return []
+        return [Series(name or "column 1", numbers, unit)]
+    table = values if values.shape[0] >= values.shape[1] else values.T
+    names = columns or tuple(f"column {index + 1}" for index in range(table.shape[1]))
+    if len(names) != table.shape[1]:
+        raise RecordingError(
+            f"{path}: columns lists {len(names)} names, but {name or 'the array'} has "
+            f"{table.shape[1]} columns"
+        )
+    prefix = f"{name}/" if name else ""
+    found = []
+    for index, own in enumerate(names):
+        numbers = numbers_of(table[:, index])
+        if numbers is not None:
+            part, inside = split_heading(own)
+            found.append(Series(prefix + part, numbers, inside or unit))
+    return found
+
+
+_UNITS: Final = ("unit", "units", "Unit", "Units", "UNIT")
+_RATES: Final = ("sample_rate", "sampling_rate", "fs", "rate", "SampleRate")  # [Hz]
+_STEPS: Final = ("sample_time", "dt", "wf_increment", "increment")  # [s]
+_MOST_COLUMNS: Final = 256
+
+
+def read_hdf(path: Path, form: TextFormat) -> Log:
+    """Read an HDF5 file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    form : TextFormat
+        Its `columns` name the columns of matrices.
+
+    Returns
+    -------
+    Log
+        By path of the data set. Its unit is its attribute ``unit`` or ``units``, its clock the
+        attribute ``sample_rate`` [Hz] or ``dt`` [s], of it or of its group.
+    """
+    import h5py
+
+    found: list[Series] = []
+    unread: dict[str, str] = {}
+    gate = Gate(path)
+
+    def take(name: str, item: Any) -> None:
+        if not isinstance(item, h5py.Dataset) or _elsewhere(item):
+            return
+        if item.ndim > 2 or item.dtype.kind not in "biufV" or item.size < 2:
+            unread[name] = f"it has the shape {item.shape} and the type {item.dtype}"
+            return
+        if item.ndim == 2 and min(item.shape) > _MOST_COLUMNS:
+            unread[name] = f"it has the shape {item.shape}, which is no table"
+            return
+        gate.admit_array(item.shape, item.dtype)
+        for made in _series_of_matrix(name, item[()], form.columns, unread, path):
+            unit = made.unit or _unit(item)
+            found.append(Series(made.name, made.values, unit, _clock(item, len(made.values))))
+
+    with h5py.File(path, "r") as file:
+        unread |= _leads_elsewhere(file)
+        for name, item in members(file):
+            take(name, item)
+    return collected(path, found, unread)
+
+
+def _elsewhere(item: Any) -> str:
+    """Reason for which a data set is not read: another file, or other data sets that may lead to
+    one, hold its numbers.
+
+    Parameters
+    ----------
+    item : h5py.Dataset
+        The data set.
+
+    Returns
+    -------
+    str
+        ``""`` where it has its own.
+    """
+    if item.is_virtual and all(source.file_name == "." for source in item.virtual_sources()):
+        return "it is virtual, a view of other data sets; copy its numbers into one of its own"
+    if item.external or item.is_virtual:
+        return "its numbers lie in another file; copy them into this one"
+    return ""
+
+
+def _leads_elsewhere(group: Any) -> Iterator[tuple[str, str]]:
+    """Links and data sets in a group that lead to other files, or may do so, and why."""
+    import h5py
+
+    for name, item in members(group):
+        if isinstance(item, h5py.ExternalLink):
+            why = f"it is a link to {item.filename!r}; copy what that holds into this file"
+            yield name, why
+        elif isinstance(item, h5py.Dataset) and (why := _elsewhere(item)):
+            yield name, why
+
+
+def members(group: Any) -> Iterator[tuple[str, Any]]:
+    """Iterate over everything in a group and below it, once each, in the order of the names.
+
+    Parameters
+    ----------
+    group : h5py.Group
+        Of a file that is open.
+
+    Yields
+    ------
+    name, item : str, object
+        The path from `group`; a group, a data set or a link to another file.
+
+    Raises
+    ------
+    RecordingError
+        If groups are nested too deep, or there are too many parts.
+    """
+    import h5py
+
+    def address(of: Any) -> int:
+        return int(h5py.h5o.get_info(of.id).addr)
+
+    seen = {address(group)}
+    left = [("", group, iter(group))]
+    while left:
+        path, inside, names = left[-1]
+        own = next(names, None)
+        if own is None:
+            left.pop()
+            continue
+        name, link = path + own, inside.get(own, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            yield name, link
+        elif isinstance(link, h5py.HardLink) and address(item := inside[own]) not in seen:
+            seen.add(address(item))
+            yield name, item
+            if isinstance(item, h5py.Group):
+                left.append((f"{name}/", item, iter(item)))
+        if len(left) > MOST_DEPTH or len(seen) > MOST_PARTS:
+            raise RecordingError(
+                f"{group.file.filename}: its groups are nested more than {MOST_DEPTH} deep, or it "
+                f"has more than {MOST_PARTS} parts, and at most that is read"
+            )
+
+
+def _unit(item: Any) -> str:
+    for key in _UNITS:
+        if key in item.attrs:
+            said = item.attrs[key]
+            text = said.decode(errors="replace") if isinstance(said, bytes) else str(said)
+            return text.strip()
+    return ""
+
+
+def _clock(item: Any, count: int) -> Array | None:
+    for holder in (item, item.parent):
+        for keys, power in ((_STEPS, 1), (_RATES, -1)):
+            for key in keys:
+                try:
+                    step = float(np.asarray(holder.attrs[key]).ravel()[0]) ** power
+                except (KeyError, ValueError, TypeError, IndexError, ZeroDivisionError):
+                    continue
+                if np.isfinite(step) and step > 0.0:
+                    return np.arange(count, dtype=np.float64) * step
+    return None
+
 
 _DEEPEST = 12  # structs in structs
 
@@ -58,7 +328,7 @@ def _check_own_numbers(path: Path) -> None:
         return
 
     with h5py.File(path, "r") as file:
-        for name, why in leads_elsewhere(file):
+        for name, why in _leads_elsewhere(file):
             raise RecordingError(f"{path}: {name}: {why}")
         gate = Gate(path)
         for _, item in members(file):
@@ -95,7 +365,7 @@ class _Reader:
             for index, item in enumerate(value.ravel()):
                 self.take(f"{name}/{_own_name(item) or index + 1}", _record(item), depth + 1)
         elif isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
-            self.found += series_of_matrix(name, value, self.columns, self.unread, self.path)
+            self.found += _series_of_matrix(name, value, self.columns, self.unread, self.path)
         elif hasattr(value, "columns") and hasattr(value, "iloc"):  # a table or a timetable
             self._frame(name, value)
         elif depth == 0:
