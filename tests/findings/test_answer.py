@@ -16,6 +16,7 @@ from pamrs.findings import (
     FreeRunError,
     MismatchSize,
     MismatchStages,
+    MissingInput,
     beyond,
     case_verdict,
     left_of,
@@ -148,6 +149,20 @@ def test_nothing_is_missing_is_no_answer_of_a_rig_that_misses_as_a_whole() -> No
         "The refitted model still misses chamber channel by 4.6 deg (80"
     )
     assert told.headline.endswith("what is missing was not found")
+
+
+def test_what_is_missing_without_a_name_is_told_by_what_it_depends_on() -> None:
+    law = "2.5 N m, depending on the joint angle and on the direction of its stroke"
+    numbers = (0.55, 1.0, 114.0, 0.4, "joint_angle", "joint_rate", {}, [])
+    unnamed = found(group("arm", "unlisted", 0.8, 20.0), group("chamber", "none", 0.86))
+    for argument, said in (("joint_angle", True), ("", False)):
+        missing = MissingInput("arm", "N m", law, argument, *numbers)
+        told = replace(unnamed, missing_input=missing).headline
+        assert told.startswith("Something acts in the arm")
+        assert (f"; it amounts to {law}" in told) == said
+    named = found(group("arm", "effects", 0.9, 20.0))
+    missing = MissingInput("arm", "N m", law, "joint_angle", *numbers)
+    assert "it amounts to" not in replace(named, missing_input=missing).headline
 
 
 def test_the_largest_mismatch_leads_behind_a_settled_name() -> None:

@@ -25,11 +25,11 @@ PACKAGES = {
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11062,
+    "diagnosis": 11088,
     "effects": 404,
     "experiments": 1052,
     "findings": 947,
-    "fit": 2937,
+    "fit": 2936,
     "library": 71,
     "recordings": 5011,
     "report": 2059,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27537,
+    "tests": 27544,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1211,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37278
+MOST = 37303
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

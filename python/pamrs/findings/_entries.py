@@ -449,7 +449,7 @@ class WrongParameter(Entry):
     unit : str
         SI unit.
     moved_sigmas : float
-        Distance of the two values in tolerances.
+        Distance of the two values in tolerances; downwards, of a positive value, by their ratio.
     probability : float
         That the file is wrong about it.
     held_out : dict of str to StageError
@@ -480,7 +480,7 @@ class ParameterFound(Entry):
     unit : str
         SI unit.
     moved_sigmas : float
-        Distance of the two values in tolerances.
+        Distance of the two values in tolerances; downwards, of a positive value, by their ratio.
     identifiable : bool, optional
         Whether the recordings determine it.
     """

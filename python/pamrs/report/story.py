@@ -83,7 +83,9 @@ def headline(diagnosis: Findings) -> str:
         return ". ".join([*first, "; ".join(reading.text for reading in diagnosis.misread)])
     parts, missed = diagnosis.answer.parts, words.missed_sentence(diagnosis)
     parts = [part for part in parts if not missed or words.searched(part)]
-    phrases = [_phrase(diagnosis, part, MOST_RIVALS) for part in parts]
+    phrases = [
+        _phrase(diagnosis, part, MOST_RIVALS) + _missing_input(diagnosis, part) for part in parts
+    ]
     together = _together(parts, doubt=bool(missed))
     phrases = [together] if together else phrases
     still = [missed] * bool(missed)
@@ -156,6 +158,16 @@ def _phrase(diagnosis: Findings, part: Part, most: int) -> str:
     ]
     head = _head(_place(part), left, doubt=doubt)
     return f"{head}: {_listed(named, most, 'or')}" if most and named else head
+
+
+def _missing_input(diagnosis: Findings, part: Part) -> str:
+    """Words on the size of the input that is missing without a name, and what it depends on; empty
+    where no single argument explains it.
+    """
+    own = diagnosis.missing_input
+    if own is None or not own.argument or own.block != part.block or part.names:
+        return ""
+    return f"; it amounts to {own.sentence}"
 
 
 def _with_chance(text: str, chance: Part | float) -> str:

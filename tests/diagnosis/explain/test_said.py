@@ -155,9 +155,10 @@ def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
     base = FittedHypothesis((), fit(problem, RIG, (), {}, white), {}, {}, 0.0)
     quiet = judge([BlockGroup(blocks, {}, {}, [base], {UNDECIDED: 1.0}, None, {}, [])], SETTINGS)
     healthy = group("arm", "joint_angle", 0.9, "none")
+    errors_of_run = FreeRunError("Pa", 3e4, 2e4, 8.0, 4.0, 400.0, True)
 
     def told(problem: Problem, *off: str) -> str:
-        errors = {channel: FreeRunError("Pa", 3e4, 2e4, 8.0, 4.0, 400.0, True) for channel in off}
+        errors = dict.fromkeys(off, errors_of_run)
         run = FreeRun("log", "held_out", 10.0, errors)
         found = seen(healthy, verdict="none", free_run=[run])
         return next_to_record(found, [], [], RIG, quiet, problem, problem).text
@@ -167,6 +168,16 @@ def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
     assert "no judged block shows why. For the chamber: step" in told(problem, "muscle_pressure")
     # an error of the chamber goes on to the arm, which fits to the noise by itself
     assert "For the chamber" in told(problem, "joint_angle", "muscle_pressure")
+    # one that keeps more than noise within the usual error of its model is asked about first
+    arm = replace(healthy, mismatch=[replace(m, model_error=1.0) for m in healthy.mismatch])
+    large = {"joint_angle": {"noise": 1e-3, "before": 0.05, "refit": 0.05, "after": 0.05}}
+    run = FreeRun("log", "held_out", 10.0, {"muscle_pressure": errors_of_run})
+    whole = seen(arm, verdict="none", free_run=[run], fit={"channels": {}, "held_out": large})
+    text = next_to_record(whole, [], [], RIG, quiet, problem, problem).text
+    assert text.startswith(
+        "The whole rig misses the muscle pressure, and no judged block shows why"
+    )
+    assert "For the arm" in text
     few = replace(problem, blocks=[b for b in blocks if b.name != "chamber"])
     assert "record the channels between it" in told(few, "muscle_pressure")
 

@@ -29,6 +29,7 @@ from pamrs.diagnosis.fit import (
     entry_of,
     events_of,
     form_in,
+    in_tolerances,
     known_parameters,
 )
 from pamrs.diagnosis.model import (
@@ -359,7 +360,7 @@ def _wrong_parameters(
                 std=std,
                 interval=_interval(value, std, known.lower),
                 unit=known.unit,
-                moved_sigmas=(value - known.value) / known.tol,
+                moved_sigmas=in_tolerances(known, value),
                 probability=max(j.probability(Term(name)) for j in naming),
                 held_out={
                     channel: StageError(e.before, e.refit, e.after) for channel, e in errors.items()
@@ -476,7 +477,7 @@ def _parameters(
             value=fitted.values[name],
             std=fitted.std[name],
             unit=p.unit,
-            moved_sigmas=(fitted.values[name] - p.value) / p.tol,
+            moved_sigmas=in_tolerances(p, fitted.values[name]),
             identifiable=fitted.std[name] < max(DETERMINED_SHARE * p.tol, moved / _DETERMINED_MOVE),
         )
     return out

@@ -11,7 +11,7 @@ and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
 `depends`, `fits`, `places_of`, `same_data_in` (where effects act);
 `known_parameters`, `with_known` (effects that the nominal model holds, and what
-is known of all parameters); `ends_in_tolerances`,
+is known of all parameters); `ends_in_tolerances`, `in_tolerances`,
 `moved_value` (how far they may move); `spread_over_pieces`
 (standard deviations of coloured residuals).
 """
@@ -49,6 +49,7 @@ from pamrs.diagnosis.fit._fitting import (
 )
 from pamrs.diagnosis.fit._known_parameters import (
     ends_in_tolerances,
+    in_tolerances,
     known_parameters,
     moved_value,
     with_known,
@@ -91,6 +92,7 @@ __all__ = [
     "concerns",
     "depends",
     "ends_in_tolerances",
+    "in_tolerances",
     "entry_of",
     "events_of",
     "fit",

@@ -292,13 +292,16 @@ def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
 
 def _of_whole(asked: _Question, diagnosis: Findings) -> NextExperiment:
     """Next experiment where the blocks fit one by one and the whole rig misses channels: about the
-    block that keeps more than noise, or else the first along the chain, where the error begins.
+    block that keeps more than noise, if within the error of its model, or else the first along the
+    chain, where the error begins.
     """
     off = [own.channel for own in diagnosis.answer.missed]
     there = [b for b in asked.blocks if b.channel in off]
-    kept = [b for b in asked.blocks if left_in(diagnosis, b.name) == "more"]
+    kept = [
+        b for kind in ("more", "error") for b in asked.blocks if left_in(diagnosis, b.name) == kind
+    ]
     block = next(iter([*kept, *there]), None)
-    channel = block.channel if block else off[0]
+    channel = block.channel if block and block.channel in off else off[0]
     begin = f"The whole rig misses the {spoken_name(channel)}, and no judged block shows why"
     if block is None:
         what = "record the channels between it and the commands as well"
