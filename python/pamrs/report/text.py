@@ -255,14 +255,18 @@ def undetermined(effect: EffectFound) -> list[str]:
 
 
 def choice_words(effect: EffectFound, name: str) -> str:
-    """Words for the value of a choice, ``the gauge is at the valve``; empty for a number."""
+    """Words for the value of a choice, ``the gauge is at the valve``; a number in the unit that
+    people read, empty where that is the SI unit.
+    """
     info = EFFECTS.get(effect.id)
     form = info.form(effect.form) if info else None
     own = next((p for p in form.parameters if p.name == name), None) if form else None
+    found = effect.parameters[name]
     if own is None or own.role != "choice":
-        return ""
+        unit, factor = display_unit(found.unit, found.value)
+        return "" if unit == found.unit else f"{format_number(factor * found.value)} {unit}"
     told: dict[str, str] = dict(re.findall(r"(\d)(?: \([^)]*\))?: ([^,]+)", own.meaning))
-    return told.get(f"{effect.parameters[name].value:.0f}", "")
+    return told.get(f"{found.value:.0f}", "")
 
 
 def span95(entry: EffectParameterFound) -> tuple[float, float] | None:

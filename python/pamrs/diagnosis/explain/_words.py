@@ -92,9 +92,7 @@ def where(
         )
     telling = [c for c in picture.conditions if c.share > TELLING_CONDITION * c.time][:2]
     if telling:
-        text += " It is largest under: " + "; ".join(c.text for c in telling) + "."
-    if picture.intervals:
-        text += f" The intervals are those of recording {picture.recording}."
+        text += " The mismatch is largest under: " + "; ".join(c.text for c in telling) + "."
     return Where(
         block=located,
         channel=block.channel,

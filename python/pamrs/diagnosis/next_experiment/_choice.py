@@ -45,7 +45,7 @@ from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments import Experiment, experiments_of, protocol_of
 from pamrs.findings import Curves, NextExperiment, PairExperiment, RankedExperiment
 from pamrs.recordings import Recording
-from pamrs.report.text import hypothesis_label, spoken_name
+from pamrs.report.text import format_number, hypothesis_label, spoken_name
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig, reading
 
@@ -450,7 +450,7 @@ def _pairs(outcomes: Sequence[Outcome], hypotheses: Sequence[Modelled]) -> list[
 def _missed(outcome: Outcome, i: int, j: int) -> str:
     """Words on what hypothesis j misses of the prediction of hypothesis i."""
     channel, size = _largest(outcome, i, j)
-    return f"{spoken_name(channel)} by {size:.2g} times the noise level"
+    return f"{spoken_name(channel)} by {format_number(size, 2)} times the noise level"
 
 
 def _instruction(outcome: Outcome) -> str:
