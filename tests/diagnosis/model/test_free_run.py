@@ -104,6 +104,18 @@ def test_a_gas_with_a_temperature_is_judged_as_others(
     assert errors[0.0] < 500.0  # 400 Pa are noise
 
 
+def test_likely_values_keep_to_what_a_rig_can_have() -> None:
+    """A wall that takes no heat, and would take less: the volume is looked for all the same."""
+    rig = parse_rig(WARM).with_parameters({"chamber.heat_transfer_coefficient": 0.0})
+    names = ("chamber.heat_transfer_coefficient", "chamber.dead_volume")
+    known = _free_run.KnownValues(names, np.array([0.0, 5e-4]), np.diag([4.0, 5e-5]))
+    true = rig.with_parameters({"chamber.dead_volume": 5.6e-4})
+    problem = problem_of(rig, [vented(true, "held_out", 2)])
+    (run,), *_ = ran(problem, rig, rig, known=known)
+    assert run.channels["muscle_pressure"].noises > 5.0
+    assert not run.channels["muscle_pressure"].off
+
+
 def test_nothing_is_said_of_a_clock_that_is_ahead_of_its_commands() -> None:
     """No simulation answers a command that is still to come."""
     rig = parse_rig(WARM)

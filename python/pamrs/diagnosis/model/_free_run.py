@@ -14,10 +14,10 @@ from scipy.stats import chi2
 
 from pamrs._arrays import Array
 from pamrs.channels import channel_of, dotted, recorded_as, unit_of
-from pamrs.diagnosis.fit import Events, Key, Problem, Stages, with_known
+from pamrs.diagnosis.fit import Events, Key, Problem, Stages, known_parameters, with_known
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Block, Prepared, Residual
-from pamrs.effects import EFFECTS, ports_of
+from pamrs.effects import EFFECTS, find_parameter, ports_of
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.findings import FreeRun, FreeRunError, Trace
 from pamrs.recordings import Recording
@@ -241,10 +241,14 @@ def _least_misses(
     Steps of Gauss and Newton inside that distance, each tried by a simulation.
     """
     starts, count = _gas_starts(final, prepared), len(known.names)
+    of_file = known_parameters(final)
+    bounds = [of_file.get(name) or find_parameter(name) for name in known.names]
+    low, high = (np.array([getattr(p, end) for p in bounds]) for end in ("lower", "upper"))
     compared = _compared(prepared, logged)
 
     def run(moved: Array) -> dict[str, Array]:
-        values = dict(zip(known.names, known.values + known.root @ moved[:count], strict=True))
+        allowed = np.clip(known.values + known.root @ moved[:count], low, high)
+        values = dict(zip(known.names, allowed.tolist(), strict=True))
         late = _with_late_commands(logged, _OFF_LATE * float(moved[count]))
         warm = zip(starts.items(), moved[count + 1 :].tolist(), strict=True)
         begins = {name: start.kelvin + start.unsure * away for (name, start), away in warm}
