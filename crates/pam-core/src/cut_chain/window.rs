@@ -187,8 +187,8 @@ impl<'a, S: Number> Cut<'a, S> {
         match &self.output {
             Output::State(reading) => reading.read(plant, &course.state, time),
             Output::Pull(k, rest) => {
-                let pull = plant.pull(*k, &course.state, &course.memory, scratch) + *rest;
-                plant.cell_drift(time).map_or(pull, |drift| pull + drift)
+                let pull = plant.pull(*k, &course.state, &course.memory, scratch);
+                plant.at_cell(pull, time) + *rest
             }
             Output::Temperature(k, off) => match plant.thermometer(*k) {
                 Some((reading, _)) => course.state[reading] + *off,
