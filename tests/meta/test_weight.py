@@ -25,23 +25,23 @@ PACKAGES = {
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11066,
+    "diagnosis": 11105,
     "effects": 404,
     "experiments": 1052,
     "findings": 947,
     "fit": 2937,
     "library": 71,
-    "recordings": 5192,
+    "recordings": 5199,
     "report": 2059,
-    "rig": 2222,
-    "rigs": 139,
-    "simulation": 1080,
+    "rig": 2225,
+    "rigs": 141,
+    "simulation": 1090,
     "studio": 663,
     "sweeps": 812,
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27537,
+    "tests": 27679,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1198,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37463
+MOST = 37524
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -296,7 +296,7 @@ pub const BLOCKS: &[Block] = &[
     },
     Block {
         name: "valve",
-        acts_in: &["supply", "chamber"],
+        acts_in: &["supply", "chamber", "flow"],
         keys: &[
             Key::choice("flow", &["orifice", "iso_6358"], "orifice"),
             Key::new("discharge_area_max", "m2", 1e-11, 0.01).only(&["orifice"]).moves(),
@@ -322,7 +322,7 @@ pub const BLOCKS: &[Block] = &[
     },
     Block {
         name: "line",
-        acts_in: &["supply", "chamber"],
+        acts_in: &["supply", "chamber", "flow"],
         keys: &[
             Key::choice("kind", &["tube", "orifice"], "tube"),
             Key::new("length", "m", 0.0001, 1000.0).only(TUBE).moves(),
