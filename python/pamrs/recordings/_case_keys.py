@@ -95,6 +95,7 @@ CLOCK: Final[dict[str, Rule]] = {
 #: The table of a channel that stands in the log; ``unit`` is that of the channel.
 CHANNEL: Final[dict[str, Rule]] = {
     "column": Rule(is_name, "a text", "its series in the log"),
+    "less": Rule(is_name, "a text", "a second series, taken off it before what follows"),
     "unit": Rule(is_name, "a text"),
     **dict.fromkeys(KEYS, Rule(None, "a calibration", "value = scale raw + offset, or from to")),
     "time": Rule(None, "a series, or a table", "its own clock"),

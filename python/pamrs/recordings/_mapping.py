@@ -52,6 +52,8 @@ class Source:
         Unit of the values.
     absolute : bool
         Whether that is an absolute pressure.
+    less : str
+        A second series of the log, taken off the first one number by number; empty for none.
     line : Calibration
         From the numbers of the log.
     value : float
@@ -68,6 +70,7 @@ class Source:
     column: str
     unit: str
     absolute: bool = False
+    less: str = ""
     line: Calibration = Calibration()
     value: float = math.nan
     clock: Clock | None = None
@@ -149,6 +152,7 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
     line = read_calibration(problems, label, entry)
     clock = _clock(problems, f"{label}.time", entry["time"]) if "time" in entry else None
     hold = entry.get("hold", False)
+    shared["less"] = entry.get("less", "")
     return Source(name, entry["column"], unit, line=line, clock=clock, hold=hold, **shared)
 
 
