@@ -925,7 +925,7 @@ def predicted(
 
 
 def _outlets(prepared: Prepared) -> dict[str, float]:
-    """Where a recording says that regulators begin [Pa, gauge]."""
+    """Pressures at which a recording says that regulators begin [Pa, gauge]."""
     return {name: pressure for name, (pressure, _) in prepared.outlets.items()}
 
 

@@ -536,7 +536,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
 
 
 def _stated_outlets(recording: Recording, rig: Rig) -> dict[str, tuple[float, float]]:
-    """Where a recording says that regulators begin, and how well it knows that."""
+    """Pressures at which a recording says that regulators begin, and how well it knows them."""
     outlets = {}
     for supply in supplies_of(rig, "regulator"):
         full = qualified("supply", supply)
