@@ -167,6 +167,11 @@ CHANNELS: Final[dict[str, Channel]] = {
             only=("gas", "energy_balance"),
         ),
         Channel(
+            "air_flow", "kg/s", -100.0, 100.0, "chamber",
+            "flow flowmeter durchfluss massenstrom caudal debit mdot", "mass air gas chamber",
+            "flow into the muscle or its chamber, by a meter in front of it", "clips named extra",
+        ),
+        Channel(
             "ambient_temperature", "K", 50.0, 2000.0, "",
             f"{_OUTSIDE} umgebungstemperatur raumtemperatur tamb troom",
             "temperature temp temperatur thermo tc umgebungstemperatur raumtemperatur tamb troom",

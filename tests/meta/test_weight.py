@@ -25,23 +25,23 @@ PACKAGES = {
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11088,
+    "diagnosis": 11129,
     "effects": 404,
     "experiments": 1052,
     "findings": 947,
     "fit": 2936,
     "library": 71,
-    "recordings": 5011,
-    "report": 2059,
-    "rig": 2222,
-    "rigs": 139,
-    "simulation": 1080,
+    "recordings": 5019,
+    "report": 2067,
+    "rig": 2225,
+    "rigs": 141,
+    "simulation": 1090,
     "studio": 663,
     "sweeps": 812,
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27544,
+    "tests": 27716,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1211,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37303
+MOST = 37375
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

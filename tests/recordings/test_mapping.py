@@ -81,6 +81,23 @@ def test_a_channel_that_had_one_value_all_the_time(tmp_path: Path, clocks: int) 
         load_recordings(file, channels={"length": {"value": 0.25, "unit": "m"}})
 
 
+def test_a_channel_that_is_one_series_less_another(tmp_path: Path) -> None:
+    data = signals()
+    flows = {"q_in": data["p1"], "q_out": 0.25 * data["p1"], "short": data["p1"][:5]}
+    file = npz(tmp_path, t=data["t"], p1=data["p1"], **flows)
+    entry = {"column": "q_in", "less": "q_out", "unit": "g/s", "scale": 2.0}
+    got = one(file, channels=BASE | {"air_flow": entry})
+    np.testing.assert_allclose(got.channels["air_flow"], 1.5e-3 * data["p1"], rtol=1e-12)
+    for wrong, words in (
+        ({"less": "short"}, r"air_flow\.less = 'short' is not allowed: .* same rows as 'q_in'"),
+        ({"less": "q_up"}, "q_up"),
+        ({"less": ""}, r"air_flow\.less"),
+        ({"unit": "bar"}, "kg/s"),
+    ):
+        with pytest.raises(RecordingError, match=words):
+            one(file, channels=BASE | {"air_flow": entry | wrong})
+
+
 def test_channels_with_clocks_of_their_own(tmp_path: Path) -> None:
     """Fast pressures are averaged over the encoder's interval, its clock is 40 ms behind, and the
     command holds from one change to the next.

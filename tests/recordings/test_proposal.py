@@ -415,7 +415,8 @@ def test_channels_that_are_missing_are_explained(tmp_path: Path) -> None:
     assert "valve_command (voltage of the valve)" in told
     assert "joint_torque (torque of the muscles at the joint, by a torque sensor; not need" in told
     told = missing(pamrs.rigs.bench())
-    assert told.endswith("force (pull of the muscles, by a load cell)")  # which a frame needs
+    assert "force (pull of the muscles, by a load cell), " in told  # which a frame needs
+    assert told.endswith("by a meter in front of it; not needed, tells blocks apart)")
 
 
 def test_columns_that_are_no_channel_are_said(tmp_path: Path) -> None:

@@ -282,7 +282,7 @@ pub const BLOCKS: &[Block] = &[
         name: "supply",
         acts_in: &["supply"],
         keys: &[
-            Key::choice("kind", &["tank", "constant", "regulator"], "tank"),
+            Key::choice("kind", &["tank", "constant", "regulator", "measured"], "tank"),
             Key::new("volume", "m3", 1e-7, 1000.0).only(&["tank"]).moves(),
             Key::new("initial_pressure", "Pa", 0.0, 1e8),
             Key::new("time_constant", "s", 0.0001, 100.0).or(0.05).only(REGULATOR).moves(),
@@ -296,7 +296,7 @@ pub const BLOCKS: &[Block] = &[
     },
     Block {
         name: "valve",
-        acts_in: &["supply", "chamber"],
+        acts_in: &["supply", "chamber", "flow"],
         keys: &[
             Key::choice("flow", &["orifice", "iso_6358"], "orifice"),
             Key::new("discharge_area_max", "m2", 1e-11, 0.01).only(&["orifice"]).moves(),
@@ -322,7 +322,7 @@ pub const BLOCKS: &[Block] = &[
     },
     Block {
         name: "line",
-        acts_in: &["supply", "chamber"],
+        acts_in: &["supply", "chamber", "flow"],
         keys: &[
             Key::choice("kind", &["tube", "orifice"], "tube"),
             Key::new("length", "m", 0.0001, 1000.0).only(TUBE).moves(),
@@ -475,6 +475,7 @@ pub const BLOCKS: &[Block] = &[
             Key::new("pressure_zero", "Pa", -1e6, 1e6).or(0.0).moves(),
             Key::new("angle_zero", "rad", -TAU, TAU).or(0.0).moves(),
             Key::new("length_zero", "m", -10.0, 10.0).or(0.0).moves(),
+            Key::new("force_gain", "1", 0.01, 100.0).or(1.0).moves(),
         ],
     },
 ];

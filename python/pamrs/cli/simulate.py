@@ -26,6 +26,7 @@ _DIMENSIONS = {
     "valve_command": "voltage",
     "supply_command": "pressure",
     "pressure": "pressure",
+    "supply_pressure": "pressure",
     "length": "length",
 }
 #: Signals that a rig cannot do without, each with an example.

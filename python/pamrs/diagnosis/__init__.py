@@ -63,7 +63,7 @@ from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationE
 from pamrs.findings import MOST_MISSED, Answer, Limit, MissingInput, NextExperiment, beyond
 from pamrs.recordings import Case, is_table, load_case
 from pamrs.rig import Rig, load_rig
-from pamrs.simulation import core_rig, regulators_of
+from pamrs.simulation import core_rig, supplies_of
 
 __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose", "missing_input"]
 
@@ -124,7 +124,7 @@ def _regulators_in_noise(problem: Problem, rig: Rig) -> dict[str, str]:
     (errors in variables).
     """
     tables = rig.tables("supply")
-    drooping = [name for name in regulators_of(rig) if tables[name]["droop"] > 0.0]
+    drooping = [name for name in supplies_of(rig, "regulator") if tables[name]["droop"] > 0.0]
     regulated = [b for b in problem.blocks if b.kind == "supply" and block_of(b.name) in drooping]
     recordings = problem.recordings
     reasons = {}

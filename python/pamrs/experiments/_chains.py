@@ -22,7 +22,7 @@ from pamrs.channels import dotted
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS, qualified
-from pamrs.simulation import Simulation, Simulator, has_frame, regulators_of, simulate
+from pamrs.simulation import Simulation, Simulator, has_frame, simulate, supplies_of
 
 BANDWIDTH = 15.0  # [rad/s] bandwidth of the pressure loop by which commands are found on the model
 # [s] rise of several chains' pressures to find where joints move: slow beside lags
@@ -134,7 +134,7 @@ def chains_of(rig: Rig) -> list[Chain]:
         found = [Chain(chamber, (), None, chamber, ()) for chamber in dict.fromkeys(own)]
     else:
         found = []
-        for name in regulators_of(rig):
+        for name in supplies_of(rig, "regulator"):
             behind = joined(rig, qualified("supply", name))
             if behind:
                 found.append(Chain(name, (), name, behind[0], _moved(rig, set(behind))))

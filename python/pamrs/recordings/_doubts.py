@@ -217,7 +217,8 @@ def _rated(name: str, channels: Mapping[str, Array], rig: Rig | None) -> tuple[f
     """Largest pressure [Pa] of a supply by rig file or regulator's command, and words on it."""
     rated: list[tuple[float, str]] = []
     for block, table in (rig.tables("supply") if rig else {}).items():
-        if channel_of(name) == "supply_pressure" and dotted("supply_pressure", block) != name:
+        other = channel_of(name) == "supply_pressure" and dotted("supply_pressure", block) != name
+        if other or table["kind"] == "measured":
             continue
         command = channels.get(dotted("supply_command", block))
         if table["kind"] != "regulator":

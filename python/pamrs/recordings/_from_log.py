@@ -784,13 +784,21 @@ def _with_remarks(
 
 def _sampled(log: Log, item: Source, clocks: Clocks, clock: Clock) -> Sampled:
     """Values and times of one channel in SI; rows without a time are left out."""
-    series = switched(log.find(item.column))
-    if series.labels:
-        raise RecordingError(
-            f"{log.path}: {item.column!r} holds texts like {series.labels[0]!r}, no numbers for "
-            f"{item.channel!r}"
-        )
+    series, *others = (switched(log.find(name)) for name in (item.column, item.less) if name)
     raw, said = series.values, ""
+    for each in (series, *others):
+        if each.labels:
+            raise RecordingError(
+                f"{log.path}: {each.name!r} holds texts like {each.labels[0]!r}, no numbers for "
+                f"{item.channel!r}"
+            )
+    for less in others:
+        if len(less.values) != len(raw) or less.time is not series.time:
+            raise RecordingError(
+                f"{log.path}: channels.{item.channel}.less = {item.less!r} is not allowed: a "
+                f"series of the same rows as {item.column!r} is needed"
+            )
+        raw = raw - less.values
     if CHANNELS[channel_of(item.channel)].has("moves"):
         raw, said = counted_on(raw)
     made = sampled(item.channel, item.si(raw), clocks.of(series, clock), _si_unit(item), item.hold)

@@ -199,6 +199,7 @@ CLOCK: Final[dict[str, Rule]] = {
 #: The table of a channel that stands in the log; ``unit`` is that of the channel.
 CHANNEL: Final[dict[str, Rule]] = {
     "column": Rule(is_name, "a text", "its series in the log"),
+    "less": Rule(is_name, "a text", "a second series, taken off it before what follows"),
     "unit": Rule(is_name, "a text"),
     **dict.fromkeys(
         CALIBRATION_KEYS, Rule(None, "a calibration", "value = scale raw + offset, or from to")
@@ -256,6 +257,8 @@ class Source:
         Unit of the values.
     absolute : bool
         Whether that is an absolute pressure.
+    less : str
+        A second series of the log, taken off the first one number by number; empty for none.
     line : Calibration
         From the numbers of the log.
     value : float
@@ -272,6 +275,7 @@ class Source:
     column: str
     unit: str
     absolute: bool = False
+    less: str = ""
     line: Calibration = Calibration()
     value: float = math.nan
     clock: Clock | None = None
@@ -353,6 +357,7 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
     line = read_calibration(problems, label, entry)
     clock = _clock(problems, f"{label}.time", entry["time"]) if "time" in entry else None
     hold = entry.get("hold", False)
+    shared["less"] = entry.get("less", "")
     return Source(name, entry["column"], unit, line=line, clock=clock, hold=hold, **shared)
 
 

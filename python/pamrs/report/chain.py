@@ -32,7 +32,7 @@ CHANNELS = {
     "supply": ("supply_command", "supply_pressure"),
     "valve": ("valve_command",),
     "line": ("line_pressure",),
-    "chamber": ("muscle_pressure", "temperature"),
+    "chamber": ("muscle_pressure", "temperature", "air_flow"),
     "muscle": ("muscle_force",),
     "joint": ("joint_angle", "joint_torque"),
     "load": ("length", "force"),
@@ -42,13 +42,19 @@ CHANNELS = {
 ALWAYS = ("supply_pressure", "valve_command", "muscle_pressure", "joint_angle", "length")
 """Channels that are shown where nothing measured them, too."""
 
-MOVED = {"arm": "joint", "torque": "joint", "force": "load", "temperature": "chamber"}
+MOVED = {
+    "arm": "joint",
+    "torque": "joint",
+    "force": "load",
+    "temperature": "chamber",
+    "flow": "chamber",
+}
 """Box at which a block of the diagnosis ends, where that has not its name."""
 
 PULLS = ("force", "torque")
 """Blocks of the diagnosis that are what muscles pull."""
 
-UNDER = (*PULLS, "temperature")
+UNDER = (*PULLS, "temperature", "flow")
 """Blocks of the diagnosis whose boxes stand in another block too; their residual stands under
 them."""
 

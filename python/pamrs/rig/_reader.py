@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 from pamrs._checks import angle_meant, as_said
@@ -39,6 +40,8 @@ from pamrs.units import from_si, to_si, with_unit
 _TOP = ("schema", "name", "description", "case", "limits", "effects", "model_error")
 _QUANTITY = ("value", "unit", "tol", "unknown", "error")
 _OWN = "own"
+#: Keys of [sensors] that only loads of some kinds have.
+_SENSORS_OF_LOADS = {"length_zero": ("mass",), "force_gain": ("mass", "frame")}
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -258,7 +261,7 @@ class Reader:
             "pressure_zero": tables_of(model, "chamber"),
             "angle_zero": tables_of(model, "joint"),
         }
-        self._length_zero(model, raw)
+        self._of_loads(model, raw)
         for name, table in tables_of(model, "sensors").items():
             if not name or not self.whole:
                 continue
@@ -296,22 +299,23 @@ class Reader:
                 if inlet and tol and "pressure_zero" not in given:
                     self.tolerances[f"{qualified(block, name)}.pressure_zero"] = tol
 
-    def _length_zero(self, model: dict[str, Any], raw: Any) -> None:
-        """Keep ``length_zero`` in unnamed sensors of a rig whose mass moves, refuse others."""
-        moves = (model["load"] or {}).get("kind") == "mass"
-        for name, table in tables_of(model, "sensors").items():
-            if moves and not name:
+    def _of_loads(self, model: dict[str, Any], raw: Any) -> None:
+        """Keep what belongs to a load in unnamed sensors of a rig that has one, refuse others."""
+        kind = (model["load"] or {}).get("kind")
+        for (name, table), (key, kinds) in product(
+            tables_of(model, "sensors").items(), _SENSORS_OF_LOADS.items()
+        ):
+            if kind in kinds and not name:
                 continue
-            given = isinstance(raw, Mapping) and "length_zero" in (
-                raw.get(name) or {} if name else raw
-            )
+            given = isinstance(raw, Mapping) and key in (raw.get(name) or {} if name else raw)
             if given and self.whole:
                 label = qualified("sensors", name)
                 needs = "it belongs in [sensors], without a name"
-                if not moves:
-                    needs = 'a [load] with kind = "mass" is needed'
-                self.problems.append(f"{label}.length_zero is not allowed: {needs}")
-            table.pop("length_zero", None)
+                if kind not in kinds:
+                    allowed = " or ".join(f'"{each}"' for each in kinds)
+                    needs = f"a [load] with kind = {allowed} is needed"
+                self.problems.append(f"{label}.{key} is not allowed: {needs}")
+            table.pop(key, None)
 
     # -------------------------------------------------------------------- values
 

@@ -211,6 +211,7 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
                 "angle_zero": table.get("angle_zero", 0.0),
             }
             | {key: table[key] for key in ("length_zero",) if key in table}
+            | ({"force_gain": gain} if (gain := table.get("force_gain", 1.0)) != 1.0 else {})
             for name, table in tables_of(model, "sensors").items()
         ],
         "effects": [

@@ -172,7 +172,9 @@ def bench(muscle: Muscle | None = None, name: str = "bench") -> Rig:
         "max_length": rest * (1.0 - _INSIDE * low),
     }
     own = {key.name: muscle.parameters[key.name] for key in keys_of("muscle", muscle.parameters)}
-    return Rig(name, {**rig.model, "muscle": {**own, "count": 1}, "load": frame})
+    cell = {**rig.model["sensors"], "force_gain": 1.0}
+    put = {"muscle": {**own, "count": 1}, "load": frame, "sensors": cell}
+    return Rig(name, {**rig.model, **put})
 
 
 def sealed_chamber() -> Rig:

@@ -11,7 +11,7 @@ from pamrs.simulation._driving import (
     has_frame,
     initial_names,
     inputs_of,
-    regulators_of,
+    supplies_of,
 )
 from pamrs.simulation._replay import differences, reading, replay
 from pamrs.simulation._side_by_side import REDUCTIONS, simulate_batch
@@ -42,9 +42,9 @@ __all__ = [
     "initial_names",
     "inputs_of",
     "reading",
-    "regulators_of",
     "replay",
     "simulate",
     "simulate_batch",
+    "supplies_of",
     "whole_samples",
 ]

@@ -357,6 +357,7 @@ class Batch:
         supply_command: ArrayLike | Mapping[str, ArrayLike] | None = None,
         length: ArrayLike | None = None,
         pressure: ArrayLike | Mapping[str, ArrayLike] | None = None,
+        supply_pressure: ArrayLike | Mapping[str, ArrayLike] | None = None,
     ) -> dict[str, Array]:
         """Hold a command of each plant for one sample.
 
@@ -366,7 +367,7 @@ class Batch:
             Commands [V]; needed by rigs with a valve, of several one for each name.
         supply_command : float or array_like, shape (n,), or mapping of str to either, optional
             Set pressures of a regulator [Pa, gauge].
-        length, pressure : float or array_like, shape (n,), optional
+        length, pressure, supply_pressure : float or array_like, shape (n,), optional
             As in :meth:`pamrs.Simulator.step`.
 
         Returns
@@ -380,7 +381,7 @@ class Batch:
             If a command is missing, not finite (the index is the plant's) or of another length; the
             batch stays as it is.
         """
-        asked = by_signal(valve_command, supply_command, length, pressure)
+        asked = by_signal(valve_command, supply_command, length, pressure, supply_pressure)
         return self._named(self._core.advance(1, self._inputs.rows(len(self), asked), True))
 
     @quantities

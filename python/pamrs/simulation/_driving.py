@@ -21,7 +21,7 @@ from pamrs.simulation._plants import rowwise
 Signals = ArrayLike | Mapping[str, ArrayLike]
 
 #: What a rig can be driven by, in the order in which it is recorded.
-SIGNALS = ("valve_command", "supply_command", "length", "pressure")
+SIGNALS = ("valve_command", "supply_command", "length", "pressure", "supply_pressure")
 #: State that an initial value can be given for, and the block whose name stands behind it.
 _INITIAL = {
     "muscle_pressure": "chamber",
@@ -58,7 +58,8 @@ def signals_of(
     asked : mapping of str to array_like, shape (n,), or to a mapping of str to array_like
         A user's arguments by :data:`SIGNALS`, None for those that are left out: commands [V] of
         valves, set pressures [Pa, gauge] of regulators, the length [m] that a load frame
-        prescribes, and pressures [Pa, gauge] that are held in chambers without a valve.
+        prescribes, and pressures [Pa, gauge] that are held in chambers without a valve and that
+        measured supplies had.
     rows : int, optional
         How many values there must be; numbers are taken as signals that stay.
 
@@ -97,8 +98,9 @@ class Inputs:
     def __init__(self, rig: Rig) -> None:
         self._names = {
             "valve_command": (list(rig.tables("valve")), "valve"),
-            "supply_command": (regulators_of(rig), "supply of kind regulator"),
+            "supply_command": (supplies_of(rig, "regulator"), "supply of kind regulator"),
             "pressure": (list(rig.tables("chamber")), "chamber"),
+            "supply_pressure": (supplies_of(rig, "measured"), "supply of kind measured"),
         }
         self._valves = [dotted("valve_command", name) for name in self._names["valve_command"][0]]
         self._frame = has_frame(rig)
@@ -119,7 +121,9 @@ class Inputs:
         found = [*self._valves, *(["length"] if self._frame else [])]
         found += [dotted("supply_command", name) for name in self._names["supply_command"][0]]
         chambers = [name for name in self._names["pressure"][0] if name not in self._fed]
-        return found + [dotted("pressure", name) for name in chambers]
+        found += [dotted("pressure", name) for name in chambers]
+        sources = self._names["supply_pressure"][0]
+        return found + [dotted("supply_pressure", name) for name in sources]
 
     def named(self, asked: Mapping[str, Any]) -> dict[str, ArrayLike]:
         """A user's arguments by the core's names, as they were given; arguments and errors as of
@@ -195,10 +199,12 @@ class Inputs:
                     f"{name} is given, which only a rig without [valve] takes: there the valve "
                     "decides"
                 )
-            if channel == "supply_command" and not self._names["supply_command"][0]:
+            kind = {"supply_command": "regulator", "supply_pressure": "measured"}.get(channel)
+            if kind is not None and not self._names[channel][0]:
+                what = "a regulator" if kind == "regulator" else kind
                 raise ParameterError(
-                    "supply_command is given, which only a supply takes that is a regulator "
-                    '([supply] kind = "regulator")'
+                    f"{channel} is given, which only a supply takes that is {what} "
+                    f'([supply] kind = "{kind}")'
                 )
 
 
@@ -261,7 +267,8 @@ def prescribed(
         if channel_of(name) in ("valve_command", "supply_command"):
             driven[name] = signal
             continue
-        channel = name.replace("pressure", "muscle_pressure", 1)
+        held = channel_of(name) == "pressure"
+        channel = name.replace("pressure", "muscle_pressure", 1) if held else name
         first: Any = float(signal[0]) if plants is None else signal[..., 0]
         if plants is not None:
             first = np.ascontiguousarray(np.broadcast_to(first, (plants,)))
@@ -318,9 +325,9 @@ def has_frame(rig: Rig) -> bool:
     return any(load["kind"] == "frame" for load in rig.tables("load").values())
 
 
-def regulators_of(rig: Rig) -> list[str]:
-    """Names of the supplies that are regulators."""
-    return [name for name, table in rig.tables("supply").items() if table["kind"] == "regulator"]
+def supplies_of(rig: Rig, kind: str) -> list[str]:
+    """Names of the supplies of a kind: ``regulator``, ``measured``."""
+    return [name for name, table in rig.tables("supply").items() if table["kind"] == kind]
 
 
 def sensor_zero(rig: Rig, kind: str, key: str, block: str) -> float:

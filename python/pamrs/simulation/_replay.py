@@ -10,7 +10,7 @@ import numpy as np
 from pamrs._arrays import Array
 from pamrs.channels import channel_of, dotted, recorded_as
 from pamrs.errors import RecordingError
-from pamrs.simulation._driving import has_frame, regulators_of, sensor_zero
+from pamrs.simulation._driving import has_frame, sensor_zero, supplies_of
 from pamrs.simulation._simulation import Simulation, simulate
 
 if TYPE_CHECKING:
@@ -38,9 +38,10 @@ def replay(
 ) -> Simulation:
     """Simulate a rig from a recording's first values under its inputs.
 
-    Commands of valves and regulators come from the recording, the length of a load frame and the
-    pressures of chambers that nothing feeds as well (``muscle_pressure``, or where that was not
-    measured ``pressure_command``); what a recording leaves unusable holds its last usable value.
+    Commands of valves and regulators come from the recording, the length of a load frame, the
+    pressures of supplies of kind ``measured`` and those of chambers that nothing feeds as well
+    (``muscle_pressure``, or where that was not measured ``pressure_command``); what a recording
+    leaves unusable holds its last usable value.
     Parameters that had another value in the recording have it.
 
     Parameters
@@ -70,7 +71,11 @@ def replay(
     """
     rig = recording.rig_there(rig)
     drive = _drive(rig, recording)
-    prescribed = {"muscle_pressure": drive.get("pressure", {}), "length": drive.get("length")}
+    prescribed = {
+        "muscle_pressure": drive.get("pressure", {}),
+        "supply_pressure": drive.get("supply_pressure", {}),
+        "length": drive.get("length"),
+    }
     initial = {}
     for channel, (block, _) in _STATES.items():
         own = prescribed.get(channel)
@@ -97,11 +102,18 @@ def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
         drive["valve_command"] = valves
     commands = {
         name: _held(recording, dotted("supply_command", name))
-        for name in regulators_of(rig)
+        for name in supplies_of(rig, "regulator")
         if _usable(recording, "supply_command", name)
     }
     if commands:
         drive["supply_command"] = commands
+    sources = supplies_of(rig, "measured")
+    if sources:
+        drive["supply_pressure"] = {
+            name: _held(recording, dotted("supply_pressure", name))
+            - sensor_zero(rig, *_STATES["supply_pressure"], name)
+            for name in sources
+        }
     frame = has_frame(rig)
     if frame:
         drive["length"] = _held(recording, "length")
@@ -157,8 +169,10 @@ def differences(result: Simulation, recording: Recording) -> dict[str, float]:
         Channel -> difference in its SI unit.
     """
     drive = _drive(result.rig, recording)
-    skipped = {"time", "valve_command", "supply_command", *drive} - {"pressure"}
-    skipped |= {dotted("muscle_pressure", name) for name in drive.get("pressure", ())}
+    given = {"pressure": "muscle_pressure", "supply_pressure": "supply_pressure"}
+    skipped = {"time", "valve_command", "supply_command", *drive} - {*given}
+    for signal, channel in given.items():
+        skipped |= {dotted(channel, name) for name in drive.get(signal, ())}
     found = {}
     for name in result:
         other = recorded_as(name)

@@ -44,6 +44,7 @@ def simulate_batch(
     supply_command: Any = None,
     length: ArrayLike | None = None,
     pressure: Any = None,
+    supply_pressure: Any = None,
     record: Sequence[str] = (),
     every: int = 1,
     reduce: Mapping[str, Reduction] | None = None,
@@ -78,8 +79,8 @@ def simulate_batch(
         Set pressures of regulators [Pa, gauge], in the same way.
     length : array_like, shape (rows,) or (n, rows), optional
         What a load frame prescribes [m], in the same way.
-    pressure : array_like, shape (rows,) or (n, rows), or mapping of str to it, optional
-        Pressures of chambers without a valve [Pa, gauge], in the same way.
+    pressure, supply_pressure : array_like, shape (rows,) or (n, rows), or mapping of str to it
+        Pressures of chambers without a valve and of measured supplies [Pa, gauge], in the same way.
     record : sequence of str, optional
         Channels to be kept, nothing by default.
     every : int, optional
@@ -119,7 +120,7 @@ def simulate_batch(
     ((500,), True)
     """
     check_run(rig, sample_time)
-    asked = by_signal(valve_command, supply_command, length, pressure)
+    asked = by_signal(valve_command, supply_command, length, pressure, supply_pressure)
     given = inputs_of(rig).named(asked)
     signals = {name: _numbers(name, values) for name, values in given.items()}
     rows = _row_count(signals, duration, sample_time)

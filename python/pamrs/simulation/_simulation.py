@@ -498,6 +498,7 @@ def simulate(
     supply_command: Signals | None = None,
     length: ArrayLike | None = None,
     pressure: Signals | None = None,
+    supply_pressure: Signals | None = None,
     record: Sequence[str] | None = None,
 ) -> Simulation:
     """Simulate a rig from an initial state by fixed-step RK4.
@@ -533,6 +534,9 @@ def simulate(
         (``[load] kind = "frame"``) prescribes.
     pressure : array_like, shape (n,), or mapping of str to array_like, optional
         Gauge pressure at each row [Pa], straight lines between, of a chamber without a valve.
+    supply_pressure : array_like, shape (n,), or mapping of str to array_like, optional
+        The same of a supply that is only measured (``[supply] kind = "measured"``); its initial
+        pressure stays where it is left out.
     record : sequence of str, optional
         Channels to keep; all by default. Of a rig that runs in lanes (see
         :func:`pamrs.simulate_batch`) states alone (pressures, angles, rates) take a quarter less
@@ -564,7 +568,7 @@ def simulate(
     wanted = None if record is None else names_of("record", record)
     core = core_rig(rig)
     kept = 1 + len(core.inputs) + len(core.channels if wanted is None else wanted)
-    asked = by_signal(valve_command, supply_command, length, pressure)
+    asked = by_signal(valve_command, supply_command, length, pressure, supply_pressure)
     long = [name for name, signal in asked.items() if _is_long(signal)]
     rows = None if duration is None else rows_of(duration, sample_time, long)
     check_rows(kept, rows or 0)
@@ -576,7 +580,7 @@ def simulate(
     if count != rows:
         check_rows(kept, count)
     for name, signal in signals.items():
-        if channel_of(name) in ("supply_command", "pressure"):
+        if channel_of(name) in ("supply_command", "pressure", "supply_pressure"):
             doubt_pascals(name, signal, inside=2)
     start = initial_values(initial, rig)
     held = {

@@ -152,6 +152,7 @@ class Simulator:
         supply_command: float | Mapping[str, float] | None = None,
         length: float | None = None,
         pressure: float | Mapping[str, float] | None = None,
+        supply_pressure: float | Mapping[str, float] | None = None,
     ) -> dict[str, float]:
         """Hold a command for one sample.
 
@@ -161,9 +162,9 @@ class Simulator:
             Command [V]; needed by a rig with a valve, of several one for each name.
         supply_command : float or mapping of str to float, optional
             Set pressure of a regulator [Pa, gauge].
-        length, pressure : float, optional
-            Length [m] that a load frame, and gauge pressure [Pa] that a chamber without a valve
-            reaches by the end of the sample; as for :func:`pamrs.simulate`.
+        length, pressure, supply_pressure : float, optional
+            Length [m] that a load frame, and gauge pressure [Pa] that a chamber without a valve or
+            a measured supply reaches by the end of the sample; as for :func:`pamrs.simulate`.
 
         Returns
         -------
@@ -179,10 +180,10 @@ class Simulator:
             last good sample.
         """
         done = None
-        if supply_command is length is pressure is None:
+        if supply_command is length is pressure is supply_pressure is None:
             done = self._core.step(valve_command)
         if done is None:
-            asked = by_signal(valve_command, supply_command, length, pressure)
+            asked = by_signal(valve_command, supply_command, length, pressure, supply_pressure)
             done = self._held(asked)
         sample, events = done
         if events:
@@ -203,6 +204,7 @@ class Simulator:
         supply_command: Signals | None = None,
         length: ArrayLike | None = None,
         pressure: Signals | None = None,
+        supply_pressure: Signals | None = None,
     ) -> dict[str, Array]:
         """Hold one command after the other.
 
@@ -212,8 +214,8 @@ class Simulator:
             Commands [V].
         samples : int, optional
             How many, where no signal says it.
-        supply_command, length, pressure : array_like, shape (n,), or mapping, optional
-            As in :meth:`step`, for each sample.
+        supply_command, length, pressure, supply_pressure : array_like, shape (n,), optional
+            Or a mapping; as in :meth:`step`, for each sample.
 
         Returns
         -------
@@ -228,7 +230,7 @@ class Simulator:
             As :meth:`step`.
         """
         self._check_rows(samples or 0)
-        asked = by_signal(valve_command, supply_command, length, pressure)
+        asked = by_signal(valve_command, supply_command, length, pressure, supply_pressure)
         signals, count = signals_of(self.rig, asked, samples)
         if count is None:
             raise ParameterError("samples is missing: no signal says how many there are")

@@ -34,6 +34,7 @@ def sweep(
     supply_command: ArrayLike | Mapping[str, ArrayLike] | None = None,
     length: ArrayLike | None = None,
     pressure: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    supply_pressure: ArrayLike | Mapping[str, ArrayLike] | None = None,
     initial: Mapping[str, float] | None = None,
     duration: float | None = None,
     step: float | None = None,
@@ -68,7 +69,7 @@ def sweep(
         Values [SI], a run in each row: what a sampler of SALib or ``scipy.stats.qmc`` gives.
     sample_time : float
         Time between samples [s].
-    valve_command, supply_command, length, pressure
+    valve_command, supply_command, length, pressure, supply_pressure
         As for :func:`pamrs.simulate`, with one value for each sample, the same for all runs; with
         ``duration`` a number that stays.
     initial : mapping of str to float, optional
@@ -124,6 +125,7 @@ def sweep(
         "supply_command": supply_command,
         "length": length,
         "pressure": pressure,
+        "supply_pressure": supply_pressure,
     }
     drive = OpenLoop(
         {str(name): metric_of(name, given) for name, given in metrics.items()},

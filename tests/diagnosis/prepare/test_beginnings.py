@@ -20,7 +20,7 @@ from pamrs.diagnosis.prepare import (
 )
 from pamrs.errors import PamrsError
 from pamrs.experiments import Experiment
-from pamrs.recordings import Recording
+from pamrs.recordings import OwnValue, Recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig
 from tests.diagnosis.asked import SETTINGS, diagnosed, problem_of
@@ -58,6 +58,38 @@ def test_what_shows_the_unknown_beginning_is_not_judged(outlet: float) -> None:
     assert np.std(after.value[after.rows]) < 1.1 * after.noise
     if outlet > 0.0:
         assert np.std(before.value[before.rows]) > 5.0 * before.noise
+
+
+@pytest.mark.parametrize("late", [0.0, 0.3])
+def test_a_regulator_at_rest_at_its_stated_start_is_judged_from_the_first_sample(
+    late: float,
+) -> None:
+    """The chamber is empty, the regulator stands at 1.5 bar and is then set to 3 bar."""
+    rig = RIG.with_parameters({"supply.initial_pressure": 1.5e5, "supply.dead_time": late})
+    block, prepared = made(rig, FILLING, 1.5e5, 0.0)
+    core = core_rig(rig)
+
+    def begun(value: OwnValue) -> Prepared:
+        stated = {"supply.initial_pressure": value}
+        again = prepare(replace(prepared.recording, parameters=stated), rig, SETTINGS)
+        return with_unjudged_starts([block], core, again)
+
+    said, wrong = (begun(OwnValue(p, 1.5e5, "none")) for p in (1.5e5, 2.5e5))
+    assert said.unsettled == wrong.unsettled == {}
+    assert np.std(residual(block, core, said, []).value) < 1.1 * said.noise["muscle_pressure"]
+    assert np.std(residual(block, core, wrong, []).value) > 5.0 * said.noise["muscle_pressure"]
+    assert begun(OwnValue(1.5e5, 1.5e5, "own")).unsettled["muscle_pressure"] > 0
+
+
+def test_a_stated_start_that_is_not_sure_costs_the_samples_that_show_it() -> None:
+    text = LIMITED.replace('0.5, unit = "bar"', '1.5, unit = "bar", tol = 0.2')
+    rig = parse_rig(text)
+    block, prepared = made(rig, FILLING, 1.5e5, 0.0)
+    stated = {"supply.initial_pressure": OwnValue(1.5e5, 1.5e5)}
+    unsure = prepare(replace(prepared.recording, parameters=stated), rig, SETTINGS)
+    kept = with_unjudged_starts([block], core_rig(rig), unsure)
+    least = with_unjudged_starts([block], core_rig(rig), prepared).unsettled["muscle_pressure"]
+    assert 0 < kept.unsettled["muscle_pressure"] <= least
 
 
 def test_a_log_that_begins_at_rest_loses_nothing() -> None:

@@ -15,8 +15,9 @@ import pamrs
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
+from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
-from tests.diagnosis.asked import ROLES, diagnosed
+from tests.diagnosis.asked import ROLES, diagnosed, names_value
 from tests.diagnosis.noisy import SHOULDER, driven, noisy, without
 
 DT = 0.005
@@ -71,6 +72,29 @@ def test_a_load_cell_that_is_not_zeroed_is_no_missing_physics() -> None:
     found = pamrs.diagnose(pulled(BENCH, tare=12.0))
     assert found.verdict in ("none", "parameters")
     assert found.fit["held_out"]["force"].after < 1.3
+
+
+def with_gain(value: str, rig: pamrs.Rig = BENCH) -> str:
+    """The file of a rig with the gain of a load cell."""
+    lines = [line for line in rig.to_toml_text().splitlines() if "force_gain" not in line]
+    return "\n".join(lines).replace("[sensors]", f"[sensors]\nforce_gain = {value}", 1)
+
+
+def test_a_gain_of_the_load_cell_that_is_off_is_a_wrong_value_by_name() -> None:
+    known = parse_rig(with_gain("{ value = 1, unit = '1', tol = 0.003 }"))
+    case = replace(pulled(known.with_parameters({"sensors.force_gain": 1.06}), tare=5.0), rig=known)
+    found = pamrs.diagnose(case)
+    names_value(found, "sensors.force_gain", 1.06, 0.01)
+    assert parse_rig(known.to_toml_text()).parameter("sensors.force_gain").tol == 0.003
+
+
+def test_a_gain_that_cannot_be_is_refused() -> None:
+    with pytest.raises(pamrs.RigError, match=r"sensors\.force_gain = 0 is not allowed.*0\.01"):
+        parse_rig(with_gain("{ value = 0, unit = '1' }"))
+    text = with_gain("{ value = 1, unit = '1' }", pamrs.rigs.sealed_chamber())
+    words = r'force_gain is not allowed: a \[load\] with kind = "mass" or "frame" is needed'
+    with pytest.raises(pamrs.RigError, match=words):
+        parse_rig(text)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,8 @@ pub enum Block {
     Chamber(usize),
     /// The same, and the pressure of the chamber itself, to what its thermometer reads.
     Temperature(usize),
+    /// The pressures at both ends of what feeds a chamber, and the commands, to what flows into it.
+    Flow(usize),
     /// Chamber pressures to the angle of a joint (muscles, joints and arm), or to the length of the
     /// muscle on a linear load.
     Arm(usize),
@@ -27,7 +29,7 @@ pub enum Block {
 impl Block {
     /// The block of a name: `supply`, `chamber`, `line` (its inlet) or `arm` (`load` of a linear
     /// load), with the name of the supply, chamber, line or joint behind it where it has one
-    /// (`chamber.flexor`); `temperature` of a chamber and `torque` of a joint in the same way, `force`
+    /// (`chamber.flexor`); `temperature` and `flow` of a chamber and `torque` of a joint in the same way, `force`
     /// of a linear load.
     ///
     /// # Errors
@@ -55,6 +57,12 @@ impl Block {
                 .iter()
                 .enumerate()
                 .map(|(k, c)| (dotted("temperature", &c.name), Self::Temperature(k))),
+        )
+        .chain(
+            spec.chambers
+                .iter()
+                .enumerate()
+                .map(|(k, c)| (dotted("flow", &c.name), Self::Flow(k))),
         )
         .chain(rig.wiring.inlets.iter().enumerate().map(|(k, (line, _))| {
             (dotted("line", &spec.lines[*line].name), Self::Chamber(spec.chambers.len() + k))
@@ -105,12 +113,12 @@ impl Block {
         }
     }
 
-    /// Place of the predicted state, of a temperature that of the gas's pressure; none for what
-    /// muscles pull, which is no state.
+    /// Place of the predicted state, of a temperature and of a flow that of the gas's pressure; none
+    /// for what muscles pull, which is no state.
     pub(super) fn output(self, layout: &Layout) -> Option<usize> {
         match self {
             Self::Supply(k) => Some(layout.supply(k)),
-            Self::Chamber(k) | Self::Temperature(k) => Some(layout.pressure(k)),
+            Self::Chamber(k) | Self::Temperature(k) | Self::Flow(k) => Some(layout.pressure(k)),
             Self::Arm(k) => Some(layout.angle(k)),
             Self::Pull(_) => None,
         }
@@ -123,17 +131,17 @@ impl Block {
                 self.output(layout).into_iter().collect()
             }
             Self::Arm(_) => (layout.angle(0)..layout.effect(0)).collect(),
-            Self::Pull(_) => Vec::new(),
+            Self::Pull(_) | Self::Flow(_) => Vec::new(),
         }
     }
 
-    /// Number of initial states per window; what a load cell or a torque sensor reads at rest is
-    /// one. Of a gas with a thermometer the temperature comes last in the block of its pressure;
+    /// Number of initial states per window; what a load cell, a torque sensor or a flow meter reads
+    /// at rest is one. Of a gas with a thermometer the temperature comes last in the block of its pressure;
     /// in that of its temperature it is the first, what the thermometer is off by the second, and
     /// where a late one stands the third.
     pub fn initial_count(self, rig: &Rig, measured: &Measured<'_>) -> usize {
         match self {
-            Self::Pull(_) => 1,
+            Self::Pull(_) | Self::Flow(_) => 1,
             Self::Temperature(_) => 3,
             Self::Chamber(k) if measured.thermometer(k).is_some() => 2,
             _ => self.initial_states(rig.layout()).len(),
@@ -157,6 +165,7 @@ impl Block {
                 places.extend(effect_states(rig, Place::Gas(k)));
             }
             Self::Supply(k) => places.extend(effect_states(rig, Place::Supply(k))),
+            Self::Flow(_) => {}
             Self::Pull(_) => {
                 let groups = 0..rig.wiring.groups.len();
                 places.extend(groups.flat_map(|k| effect_states(rig, Place::Group(k))));

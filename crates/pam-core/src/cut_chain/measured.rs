@@ -192,8 +192,8 @@ impl<'a> Measured<'a> {
         })
     }
 
-    /// The same, with regulators whose outlet nobody measured beginning at these pressures [Pa,
-    /// gauge] and not at that of what they feed.
+    /// The same, with regulators whose outlet nobody measured beginning at rest at these pressures
+    /// [Pa, gauge] and not at that of what they feed.
     ///
     /// # Errors
     /// [`Error::Model`] for a supply that the rig does not have; [`Error::Parameter`] for a
@@ -212,6 +212,20 @@ impl<'a> Measured<'a> {
             self.outlets.push((rig.layout().supply(k), absolute));
         }
         Ok(self)
+    }
+
+    /// What a regulator that begins at rest at a pressure of its own was set to until then [Pa,
+    /// gauge].
+    pub(crate) fn set_before(&self, rig: &Rig, input: usize) -> Option<f64> {
+        if self.outlets.is_empty() {
+            return None;
+        }
+        let spec = rig.spec();
+        let mut regulators =
+            spec.supplies.iter().enumerate().filter(|(_, s)| s.kind == "regulator");
+        let (k, _) = regulators.nth(input.checked_sub(spec.valves.len())?)?;
+        let told = self.outlets.iter().find(|(place, _)| *place == rig.layout().supply(k));
+        told.map(|(_, pressure)| pressure - rig.gas.ambient_pressure)
     }
 
     /// The same, with the pressures of a block that predicts a temperature taken anew at these

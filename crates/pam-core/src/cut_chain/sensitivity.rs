@@ -132,7 +132,7 @@ pub fn closure_terms(
     check(rig, block, measured, starts)?;
     let at = match block {
         Block::Supply(k) => Place::Supply(k),
-        Block::Chamber(k) | Block::Temperature(k) => Place::Gas(k),
+        Block::Chamber(k) | Block::Temperature(k) | Block::Flow(k) => Place::Gas(k),
         Block::Arm(k) | Block::Pull(k) => Place::Joint(k),
     };
     let plant = Plant::new(rig, rig.parameters().lift(), false)?;

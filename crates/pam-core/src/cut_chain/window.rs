@@ -50,6 +50,8 @@ enum Output<S> {
     State(Reading<S>),
     /// What the muscles at a joint or load pull, beside what the sensor reads at rest.
     Pull(usize, S),
+    /// What a meter in front of a gas reads, beside what it reads at rest.
+    Flow(usize, S),
     /// What the thermometer of a gas reads, and what it is off by [K].
     Temperature(usize, S),
 }
@@ -149,6 +151,9 @@ impl<'a, S: Number> Cut<'a, S> {
             let time = k as f64 * dt;
             let clocks = Clocks::of(&self.stepper.plant, self.block, time);
             self.command(k * self.measured.held, time, &clocks, &mut controls);
+            if k == 0 && matches!(self.output, Output::Flow(..)) {
+                course.last.spool.clone_from(&controls.spool); // nobody knows the one before
+            }
             let value = self.read(&course, time);
             sink(k, value, &self.stepper, &course.state, &controls);
             if k + 1 < n {
@@ -187,8 +192,11 @@ impl<'a, S: Number> Cut<'a, S> {
         match &self.output {
             Output::State(reading) => reading.read(plant, &course.state, time),
             Output::Pull(k, rest) => {
-                let pull = plant.pull(*k, &course.state, &course.memory, scratch) + *rest;
-                plant.cell_drift(time).map_or(pull, |drift| pull + drift)
+                let pull = plant.pull(*k, &course.state, &course.memory, scratch);
+                plant.at_cell(pull, time) + *rest
+            }
+            Output::Flow(k, rest) => {
+                plant.metered(*k, &course.state, &course.last.spool) + *rest
             }
             Output::Temperature(k, off) => match plant.thermometer(*k) {
                 Some((reading, _)) => course.state[reading] + *off,
@@ -341,7 +349,10 @@ impl<'a, S: Number> Cut<'a, S> {
         }
         let held = self.measured.held;
         let last = (self.measured.samples * held) as i64 - 1;
-        let command = |input: usize, sample: i64| commands[input][sample.clamp(0, last) as usize];
+        let command = |input: usize, sample: i64| match self.measured.set_before(plant.rig(), input) {
+            Some(pressure) if sample < 0 => pressure,
+            _ => commands[input][sample.clamp(0, last) as usize],
+        };
         let each = self.timing.sample_time / held as f64;
         let step = self.timing.sample_time / self.substeps(j / held) as f64;
         plant.delayed_controls(clocks.command, time, step, each, command, out);
@@ -427,7 +438,7 @@ impl<'a, S: Number> Cut<'a, S> {
                 from += length;
             }
         }
-        if !self.taps.is_empty() {
+        if !self.taps.is_empty() || matches!(self.output, Output::Flow(..)) {
             last.spool.clone_from(&self.stepper.controls(controls, 2).spool);
         }
     }
@@ -439,10 +450,13 @@ impl<S: Scalar> Output<S> {
         let (Block::Supply(k)
         | Block::Chamber(k)
         | Block::Temperature(k)
+        | Block::Flow(k)
         | Block::Arm(k)
         | Block::Pull(k)) = block;
-        if matches!(block, Block::Temperature(_)) {
-            return Self::Temperature(k, bumps[1]);
+        match block {
+            Block::Temperature(_) => return Self::Temperature(k, bumps[1]),
+            Block::Flow(_) => return Self::Flow(k, bumps[0]),
+            _ => {}
         }
         let Some(place) = block.output(rig.layout()) else {
             return Self::Pull(k, bumps[0]);

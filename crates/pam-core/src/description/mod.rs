@@ -32,7 +32,7 @@ pub type Port = String;
 pub struct SupplySpec {
     #[serde(default)]
     pub name: String,
-    /// `tank`, `constant` or `regulator`.
+    /// `tank`, `constant`, `regulator`, or `measured`: its pressure is given, or stays.
     pub kind: String,
     #[serde(default)]
     pub volume: f64,
@@ -356,10 +356,10 @@ impl LoadSpec {
     }
 }
 
-/// Constant sensor errors: measured = true + zero; of the chamber or joint of its name, of all (and
-/// of a load) without a name. Supplies and inlets of lines have those of their gauges themselves.
+/// Constant sensor errors: measured = true + zero, of the force on a load measured = gain * true; of
+/// the chamber or joint of its name, of all (and of a load) without a name. Supplies and inlets of lines have those of their gauges themselves.
 #[allow(missing_docs)]
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorSpec {
     #[serde(default)]
@@ -368,6 +368,8 @@ pub struct SensorSpec {
     pub angle_zero: f64,
     #[serde(default)]
     pub length_zero: f64,
+    #[serde(default = "one")]
+    pub force_gain: f64,
 }
 
 /// An effect that is switched on, with its parameters.

@@ -27,7 +27,7 @@ pub const INFO: EffectInfo = EffectInfo {
     }),
     // commands go to valves, and where a rig has none to its regulator
     same_data: &[late("input_path_lag"), late("supply_regulator_delay")],
-    acts_in: &["supply", "chamber", "arm", "pull"],
+    acts_in: &["supply", "chamber", "flow", "arm", "pull"],
     source: "Mills (1991), offset and skew of clocks",
     forms: &[Form {
         name: "offset_and_drift",

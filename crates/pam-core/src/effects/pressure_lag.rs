@@ -16,7 +16,7 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "sensors",
     at: "chamber",
     at_rest: &[AtRest::OutBelow("time_constant", SHORTEST)],
-    acts_in: &["chamber", "arm", "pull"],
+    acts_in: &["chamber", "flow", "arm", "pull"],
     source: "Doebelin, Measurement Systems, ch. 6",
     forms: &[Form {
         name: "first_order",

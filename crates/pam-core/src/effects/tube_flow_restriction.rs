@@ -55,7 +55,7 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "line",
     at: "valve",
     at_rest: &[AtRest::Set("tap", 0.0)],
-    acts_in: &["supply", "chamber", "arm", "pull"],
+    acts_in: &["supply", "chamber", "flow", "arm", "pull"],
     source: "ISO 6358-3; Eckersten (1975); Shapiro (1953) for the form pipe",
     forms: &[
         ISO_6358,

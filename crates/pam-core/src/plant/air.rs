@@ -79,36 +79,19 @@ impl<S: Scalar> Plant<'_, S> {
     #[inline(always)]
     pub(super) fn flows(&self, state: &[S], controls: &Controls<S>, here: &mut Scratch<S>) {
         let zero = constant::<S>(0.0);
-        let gas = &self.rig.gas;
-        let ambient = constant::<S>(gas.ambient_pressure);
         here.inflow.fill(zero);
         here.outflow.fill(zero);
         here.drawn.fill(zero);
         here.vented = zero;
-        for (k, (unit, valve)) in self.wiring.valves.iter().zip(&self.valves).enumerate() {
-            let spool = controls.spool[k];
-            let pressure = state[self.layout.pressure(unit.to)];
-            if spool.re() > 0.0 {
-                let opening = valve.paths[0].part(self.share(k, unit.table.eval(spool), false));
-                let upstream = self.pressure_at(unit.from, state);
-                let flow = self.valve_flow(k, &opening, upstream, pressure, false);
-                here.pass(unit.from, Node::Gas(unit.to), flow);
-            } else if spool.re() < 0.0 {
-                let opening = valve.paths[1].part(self.share(k, unit.table.eval(-spool), true));
-                let flow = self.valve_flow(k, &opening, pressure, ambient, true);
-                here.pass(Node::Gas(unit.to), Node::Ambient, flow);
+        for k in 0..self.valves.len() {
+            if let Some((from, to, flow)) = self.through_valve(k, controls.spool[k], state) {
+                here.pass(from, to, flow);
             }
         }
-        for (k, (unit, line)) in self.wiring.lines.iter().zip(&self.lines).enumerate() {
-            if unit.segments > 0 {
-                continue;
+        for (k, unit) in self.wiring.lines.iter().enumerate() {
+            if unit.segments == 0 {
+                here.pass(unit.from, unit.to, self.along_line(k, state));
             }
-            let (from, to) = (self.pressure_at(unit.from, state), self.pressure_at(unit.to, state));
-            let mut flow = line.mass_flow(gas, from, to);
-            if self.altered.laws {
-                flow = self.altered_line_flow(k, flow, from, to);
-            }
-            here.pass(unit.from, unit.to, flow);
         }
         if self.altered.waves {
             self.wave_flows(state, here);
@@ -122,6 +105,74 @@ impl<S: Scalar> Plant<'_, S> {
         if self.altered.inlets {
             self.inlet_flows(here);
         }
+    }
+
+    /// Between which nodes a valve passes air, and how much [kg/s]; None where it is shut.
+    #[inline(always)]
+    fn through_valve(&self, k: usize, spool: S, state: &[S]) -> Option<(Node, Node, S)> {
+        let (unit, valve) = (&self.wiring.valves[k], &self.valves[k]);
+        let pressure = state[self.layout.pressure(unit.to)];
+        if spool.re() > 0.0 {
+            let opening = valve.paths[0].part(self.share(k, unit.table.eval(spool), false));
+            let upstream = self.pressure_at(unit.from, state);
+            let flow = self.valve_flow(k, &opening, upstream, pressure, false);
+            Some((unit.from, Node::Gas(unit.to), flow))
+        } else if spool.re() < 0.0 {
+            let opening = valve.paths[1].part(self.share(k, unit.table.eval(-spool), true));
+            let ambient = constant(self.rig.gas.ambient_pressure);
+            let flow = self.valve_flow(k, &opening, pressure, ambient, true);
+            Some((Node::Gas(unit.to), Node::Ambient, flow))
+        } else {
+            None
+        }
+    }
+
+    /// Mass flow along a line without segments [kg/s].
+    #[inline(always)]
+    fn along_line(&self, k: usize, state: &[S]) -> S {
+        let unit = &self.wiring.lines[k];
+        let (from, to) = (self.pressure_at(unit.from, state), self.pressure_at(unit.to, state));
+        let flow = self.lines[k].mass_flow(&self.rig.gas, from, to);
+        if self.altered.laws {
+            self.altered_line_flow(k, flow, from, to)
+        } else {
+            flow
+        }
+    }
+
+    /// Mass flow into a gas [kg/s] through the valves and the lines that lead to it, as a meter in
+    /// front of it reads it; air at the temperature of the room.
+    pub fn metered(&self, gas: usize, state: &[S], spools: &[S]) -> S {
+        let (here, air, mut sum) = (Node::Gas(gas), &self.rig.gas, constant::<S>(0.0));
+        let mut add = |from: Node, to: Node, flow: S| {
+            if to == here {
+                sum += flow;
+            } else if from == here {
+                sum -= flow;
+            }
+        };
+        let leads = |valve: &usize| self.wiring.valves[*valve].to == gas;
+        for k in (0..self.valves.len()).filter(leads) {
+            if let Some((from, to, flow)) = self.through_valve(k, spools[k], state) {
+                add(from, to, flow);
+            }
+        }
+        for (k, unit) in self.wiring.lines.iter().enumerate().filter(|(_, l)| l.to == here) {
+            let wave = self.wiring.waves.iter().find(|wave| wave.line == k);
+            let last = wave.map(|wave| state[self.layout.flow(wave.flow + wave.segments - 1)]);
+            add(unit.from, unit.to, last.unwrap_or_else(|| self.along_line(k, state)));
+        }
+        for (flow, acting) in &self.wiring.ports.flows {
+            let Flow::Clearance(valve) = flow else { continue };
+            if leads(valve) {
+                let area = self.effect(acting).clearance(air, spools[*valve]);
+                for (from, to) in [(self.wiring.valves[*valve].from, here), (here, Node::Ambient)] {
+                    let (up, down) = (self.pressure_at(from, state), self.pressure_at(to, state));
+                    add(from, to, air.mass_flow(area, up, down));
+                }
+            }
+        }
+        sum
     }
 
     /// What goes out of regulators is drawn from the supplies in front of them; what these take back

@@ -736,10 +736,10 @@ impl Plant<'_, f64> {
                 Channel::Contraction(k) => here.contraction[k],
                 // a load cell reads what all muscles on a load pull
                 Channel::Force(0) if self.rig.spec().load.is_some() => {
-                    here.force[0] + self.cell_drift(time).unwrap_or(0.0)
+                    self.at_cell(here.force[0], time)
                 }
-                Channel::Force(k) => here.force[k],
-                Channel::Torque(k) => here.torque[k] + self.cell_drift(time).unwrap_or(0.0),
+                Channel::Force(k) => self.at_gain(here.force[k]),
+                Channel::Torque(k) => self.at_cell(here.torque[k], time),
                 Channel::Volume(k) => here.volume[k],
                 Channel::Mass(k) => state[layout.mass(k)],
                 Channel::Flow(k) => state[layout.flow(k)],

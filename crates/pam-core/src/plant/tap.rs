@@ -49,11 +49,18 @@ impl<S: Scalar> Plant<'_, S> {
         self.wiring.ports.gauge_zero[gas].as_ref().map(|acting| self.effect(acting).drift(time))
     }
 
-    /// What a load cell reads too much at a time [N], or the sensors of the joints' torques [N m];
-    /// None where they always read the same.
+    /// What a load cell reads of a pull at a time [N], or the sensor of a joint's torque [N m].
     #[inline]
-    pub fn cell_drift(&self, time: f64) -> Option<S> {
-        self.wiring.ports.cell_zero.as_ref().map(|acting| self.effect(acting).drift(time))
+    pub fn at_cell(&self, pull: S, time: f64) -> S {
+        let read = self.at_gain(pull);
+        let drift = self.wiring.ports.cell_zero.as_ref();
+        drift.map_or(read, |acting| read + self.effect(acting).drift(time))
+    }
+
+    /// The same of a muscle among others on a load: their cell drifts once.
+    #[inline]
+    pub fn at_gain(&self, pull: S) -> S {
+        self.wiring.force_gain.map_or(pull, |id| self.values[id] * pull)
     }
 
     /// Write the pressures between valves and tubes, where sensors sit there: those of a state, its

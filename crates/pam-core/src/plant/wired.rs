@@ -24,6 +24,8 @@ pub(crate) struct Wiring {
     pub lines: Vec<LineUnit>,
     pub groups: Vec<Group>,
     pub coordinates: Vec<Coordinate>,
+    /// What a load cell reads for a newton, on a linear load.
+    pub force_gain: Option<ParameterId>,
     pub body: BodyUnit,
     /// Effects at the ports of the blocks.
     pub ports: Ports,

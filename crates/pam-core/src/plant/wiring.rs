@@ -114,6 +114,7 @@ impl Wiring {
         let body = body(spec, &mut table)?;
         sensors(spec, &mut table, &mut gases)?;
         let coordinates = zeros(spec, &table, coordinates);
+        let force_gain = table.find("sensors.force_gain").ok();
         let mut wiring = Self {
             chambers: spec.chambers.len(),
             supplies,
@@ -125,6 +126,7 @@ impl Wiring {
             lines,
             groups,
             coordinates,
+            force_gain,
             body,
             ports: EffectPorts::default(),
         };
@@ -406,6 +408,7 @@ fn sensors(spec: &RigSpec, table: &mut Parameters, gases: &mut [GasUnit]) -> Res
         add(key!("sensors", "angle_zero"), sensor.angle_zero)?;
         if spec.load.is_some() && sensor.name.is_empty() {
             add(key!("sensors", "length_zero"), sensor.length_zero)?;
+            add(key!("sensors", "force_gain"), sensor.force_gain)?;
         }
         let chambers = spec.chambers.iter().map(|c| &c.name);
         let known =

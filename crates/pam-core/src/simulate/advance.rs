@@ -195,7 +195,7 @@ impl Progress {
 /// supplied from outside (or, where it is less, vented).
 fn held_mass(plant: &Plant<'_, f64>, place: usize, state: &mut [f64]) {
     let layout = plant.rig().layout;
-    if place >= layout.mass(0) {
+    if !(layout.pressure(0)..layout.mass(0)).contains(&place) {
         return;
     }
     let gas = place - layout.supplies;

@@ -23,7 +23,7 @@ pub(crate) const LEAST_PRESSURE: f64 = 1.0;
 impl<'a> Drive<'a> {
     /// A drive over a number of samples from signals by name: the rig's inputs (`valve_command`
     /// [V], `supply_command` [Pa, gauge]), `length` of a load frame [m], `pressure` of chambers
-    /// without a valve [Pa, gauge].
+    /// without a valve and `supply_pressure` of measured supplies [Pa, gauge].
     ///
     /// # Errors
     /// [`Error::Model`] for a signal that is missing or that the rig does not take,
@@ -201,6 +201,17 @@ pub(crate) fn prescribable(rig: &Rig, name: &str) -> Result<(usize, f64, f64, &'
             )),
         };
     }
+    let (low, high, unit) = (LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8, "Pa (gauge)");
+    if let Some(k) = spec.supplies.iter().position(|s| dotted("supply_pressure", &s.name) == name) {
+        if spec.supplies[k].kind != "measured" {
+            return Err(Error::Model(format!(
+                "{name} is given, which only a supply takes that is measured ([supply] kind = \
+                    \"measured\"); this one is \"{}\"",
+                spec.supplies[k].kind
+            )));
+        }
+        return Ok((rig.layout.supply(k), low, high, unit));
+    }
     let Some(k) = spec.chambers.iter().position(|c| dotted("pressure", &c.name) == name) else {
         return Err(Error::Model(format!(
             "{name} is not a signal that this rig takes; it takes: {}",
@@ -212,7 +223,7 @@ pub(crate) fn prescribable(rig: &Rig, name: &str) -> Result<(usize, f64, f64, &'
             "{name} is given, which only a chamber without [valve] takes: there the valve decides"
         )));
     }
-    Ok((rig.layout.pressure(k), LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8, "Pa (gauge)"))
+    Ok((rig.layout.pressure(k), low, high, unit))
 }
 
 fn check_signal(

@@ -99,10 +99,44 @@ fn a_held_pressure_stays_and_a_moving_one_is_followed() {
         assert!((out.get("muscle_pressure")[k] - pressure[k]).abs() < 1e-9);
         assert!((out.get("contraction_ratio")[k] - (1.0 - length[k] / 0.276)).abs() < 1e-14);
     }
-    let valve = compiled(RigSpec::from_json(SHOULDER).unwrap());
+    let mut measured = RigSpec::from_json(SHOULDER).unwrap();
+    let valve = compiled(measured.clone());
+    let given: [(&str, &[f64]); 2] = [("valve_command", &[5.0]), ("supply_pressure", &[1e5])];
+    let message = Drive::new(&valve, 1, &given).unwrap_err().to_string();
+    assert!(message.contains("this one is \"tank\""), "{message}");
+    measured.supplies[0].kind = "measured".into();
+    let measured = compiled(measured);
+    let commands = [5.0; 50];
+    let given: [(&str, &[f64]); 2] = [("valve_command", &commands), ("supply_pressure", &pressure)];
+    let drive = Drive::new(&measured, 50, &given).unwrap();
+    let start = Initial::rest(&measured).with(&measured, "supply_pressure", 2e5).unwrap();
+    let mut out = Run(measured.clone(), Trajectory::new(&measured, 50));
+    Progress::start(&measured, &start)
+        .unwrap()
+        .advance(&measured, timing, &drive, &mut out.1)
+        .unwrap();
+    for (read, given) in out.get("supply_pressure").iter().zip(&pressure) {
+        assert!((read - given).abs() < 1e-9);
+    }
     let signals: [(&str, &[f64]); 2] = [("valve_command", &[5.0]), ("pressure", &[1e5])];
     let message = Drive::new(&valve, 1, &signals).unwrap_err().to_string();
     assert!(message.contains("without [valve]"), "{message}");
+}
+
+#[test]
+fn a_load_cell_reads_its_gain_times_the_force() {
+    let one = rig("frame", 0.0, 0.0);
+    let mut spec = one.spec().clone();
+    spec.sensors[0].force_gain = 1.04;
+    let other = compiled(spec);
+    let length = [0.25; 5];
+    let [read, more] = [&one, &other].map(|rig| {
+        let out = run(rig, pressed(rig, 3e5, 0.026).unwrap(), Some(&length), 5).unwrap();
+        (out.get("muscle_force").to_vec(), out.get("muscle_work").to_vec())
+    });
+    assert!(read.0[0] > 100.0);
+    assert!(read.0.iter().zip(&more.0).all(|(f, g)| (1.04 * f - g).abs() < 1e-9 * g));
+    assert_eq!(read.1, more.1); // what the muscle does is the same
 }
 
 #[test]

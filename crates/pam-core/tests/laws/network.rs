@@ -742,6 +742,61 @@ fn a_regulator_without_a_gauge_begins_where_it_is_told() {
     assert!(begun(&[("supply", f64::NAN)]).is_err());
 }
 
+#[test]
+fn a_regulator_was_set_to_where_it_begins_until_its_first_command_arrives() {
+    let mut spec = gas(&[("", 1e-4, 0.0)], vec![tube("supply", "chamber", 2.0, 0.004)]);
+    spec.supplies = vec![SupplySpec { dead_time: 0.1, initial_pressure: 0.0, ..regulator(0.0) }];
+    let rig = compiled(spec);
+    let (rows, dt) = (60, 0.005);
+    let (command, still) = (vec![3e5; rows], vec![0.0; rows]);
+    let signals = [("muscle_pressure", Signal { value: &still, slope: &still })];
+    let commands: [(&str, &[f64]); 1] = [("supply_command", &command)];
+    let predicted = |outlets: &[(&str, f64)]| {
+        let measured = Measured::new(&rig, rows, &commands, &signals).unwrap();
+        let measured = measured.beginning(&rig, outlets).unwrap();
+        let block = Block::from_name(&rig, "chamber").unwrap();
+        let longest = block.longest_step(&rig, &measured).unwrap();
+        let timing = Timing::new(dt, 0.001).unwrap().at_most(longest).unwrap();
+        predict(&rig, block, &measured, timing, &[0], &[]).unwrap().value
+    };
+    let (told, not_told) = (predicted(&[("supply", 0.0)]), predicted(&[]));
+    assert!(told[20].abs() < 1.0 && not_told[20] > 1e4, "{} {}", told[20], not_told[20]);
+    let truth = run(&rig, rows, &commands, dt, 0.001);
+    let missed = told.iter().zip(truth.get(&rig, "muscle_pressure").unwrap());
+    assert!(missed.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 50.0);
+}
+
+/// What a meter reads is what the chamber gains, and what leaks out behind it.
+#[test]
+fn a_meter_reads_what_flows_into_a_chamber() {
+    let rig = compiled(fed_through_a_tube(5e-6, 2.0));
+    let (rows, dt) = (400, 0.005);
+    let command: Vec<f64> = (0..rows).map(|k| 5.0 + 2.0 * (0.05 * k as f64).sin()).collect();
+    let commands: [(&str, &[f64]); 1] = [("valve_command", &command)];
+    let truth = run(&rig, rows, &commands, dt, 0.0005);
+    let names = ["supply_pressure", "line_pressure", "muscle_pressure", "joint_angle"];
+    let known: Vec<_> = names.iter().filter(|name| truth.get(&rig, name).is_some()).collect();
+    let slopes: Vec<_> = known.iter().map(|name| slopes(&truth, &rig, name, dt)).collect();
+    let signals: Vec<_> = (known.iter().zip(&slopes))
+        .map(|(name, slope)| (**name, Signal { value: truth.get(&rig, name).unwrap(), slope }))
+        .collect();
+    let measured = Measured::new(&rig, rows, &commands, &signals).unwrap();
+    let block = Block::from_name(&rig, "flow").unwrap();
+    let timing = Timing::new(dt, 0.001).unwrap();
+    let width = rig.parameters().find("line.diameter").unwrap();
+    let found = predict(&rig, block, &measured, timing, &[0], &[width]).unwrap();
+    let mass = truth.get(&rig, "air_mass").unwrap();
+    let gained: Vec<f64> = mass.windows(3).map(|m| (m[2] - m[0]) / (2.0 * dt)).collect();
+    let most = gained.iter().fold(0.0_f64, |most, flow| most.max(flow.abs()));
+    for (k, flow) in gained.iter().enumerate().skip(5) {
+        let read = found.value[k + 1];
+        assert!((read - flow).abs() < 0.02 * most, "{k}: {read} {flow}");
+        // a wider line lets more through, and at rest the meter may read anything
+        assert!(found.jacobian[2 * (k + 1)] * read >= 0.0);
+        assert!((found.jacobian[2 * (k + 1) + 1] - 1.0).abs() < 1e-15);
+    }
+}
+
 /// A gas between driven pressures is as fast as its openings alone: half as fast as beside pressures
 /// that answer, and a step of that length still ends where shorter ones do.
 #[test]

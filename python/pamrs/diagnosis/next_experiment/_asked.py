@@ -32,7 +32,7 @@ from pamrs.findings import Answer, Findings, NextExperiment, PairExperiment, Par
 from pamrs.report.text import capital, hypothesis_label, left_in, spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
-from pamrs.simulation import has_frame, regulators_of
+from pamrs.simulation import has_frame, supplies_of
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def _telling(block: Block, rig: Rig, terms: Iterable[Term] = ()) -> _Telling:
             return _TELLINGS["over"]
         lines = rig.tables("line") or rig.tables("muscle")
         return _TELLINGS["blown" if lines else "once_more"]
-    if regulators_of(rig) and not rig.tables("valve"):
+    if supplies_of(rig, "regulator") and not rig.tables("valve"):
         return _TELLINGS["set"]
     if not all(can_shut(rig, chain) for chain in _driving(block, rig)):
         return _TELLINGS["kept"]

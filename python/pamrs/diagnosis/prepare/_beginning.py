@@ -2,10 +2,11 @@
 
 A regulator whose outlet has no gauge begins a recording somewhere between what it feeds and what it
 is set to: at rest all three are the same, and a log that begins as a stopcock is opened has them
-bars apart. Along a tube of segments gas stands or flows: at rest its pressure is that of its ends,
-and a log that begins while air flows has a gradient there. What a block predicts from either tells
-the samples that depend on it; these are not judged. A joint begins at rest where that suits what
-follows better than the slope of its first samples.
+bars apart; a recording that states its ``initial_pressure`` settles that. Along a tube of segments
+gas stands or flows: at rest its pressure is that of its ends, and a log that begins while air flows
+has a gradient there. What a block predicts from either tells the samples that depend on it; these
+are not judged. A joint begins at rest where that suits what follows better than the slope of its
+first samples.
 """
 
 from __future__ import annotations
@@ -184,12 +185,15 @@ class _Beginnings:
         return int(shown[-1]) + 1 if shown.size else 0
 
     def _change_by_outlets(self, block: Block) -> Array:
-        """Change of a prediction if regulators begin at their set pressures."""
+        """Change of a prediction if regulators begin at their set pressures, or a standard
+        deviation above where the recording says that they begin.
+        """
         prepared = self.prepared
-        outlets = {
-            qualified("supply", block_of(name)): max(0.0, float(prepared.held[name][0]))
-            for name in _regulator_commands(block)
-        }
+        outlets = {}
+        for name in _regulator_commands(block):
+            full = qualified("supply", block_of(name))
+            stated = prepared.outlets.get(full, (max(0.0, float(prepared.held[name][0])), 0.0))
+            outlets[full] = sum(stated)
         try:
             return predicted(block, self.core, prepared, outlets) - self._predicted_from(
                 block, moving=False
@@ -288,7 +292,7 @@ def _unmeasured(block: Block) -> str:
         gauges = [dotted("supply_pressure", block_of(name)) for name in _regulator_commands(block)]
         reasons.append(
             "they show where the regulator began, and nobody measured that (a gauge for "
-            f"{' or '.join(gauges)} would)"
+            f"{' or '.join(gauges)} would, or its initial_pressure in the recording's parameters)"
         )
     if block.tubes:
         tubes = " and ".join(tube.name for tube in block.tubes)

@@ -13,6 +13,7 @@ from pamrs._arrays import Array, Mask
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.prepare._signals import (
     DRIVEN_COMMANDS,
+    flows_of,
     held,
     pulls_of,
     thermometers_of,
@@ -163,9 +164,9 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """``supply``, ``chamber`` (the inlet of a line too), ``temperature`` (of a chamber's gas),
-        ``arm`` (of a hanging load too) or ``pull`` (what the muscles put on a joint or a load): its
-        name without that of the tank, chamber or joint.
+        """``supply``, ``chamber`` (the inlet of a line too), ``flow`` (into a chamber),
+        ``temperature`` (of a chamber's gas), ``arm`` (of a hanging load too) or ``pull`` (what the
+        muscles put on a joint or a load): its name without that of the tank, chamber or joint.
         """
         kind = channel_of(self.name)
         alike = {"line": "chamber", "load": "arm", "force": "pull", "torque": "pull"}
@@ -174,7 +175,7 @@ class Block:
     @property
     def closure(self) -> str | None:
         """Id of the closure, a sum of terms that can stand for what is missing in it; None where
-        the simulator has none: at a load, at a force, at a temperature and in front of a line.
+        the simulator has none: at a load, a force, a flow, a temperature and in front of a line.
         """
         named = channel_of(self.name)
         return None if named in ("load", "line") else CLOSURE_OF.get(self.kind)
@@ -421,8 +422,8 @@ class _BlockMap:
         return Unjudged(name, covers, _not_recorded(missing)) if missing else None
 
     def supply(self, name: str) -> Block | Unjudged | None:
-        """The block of one supply; none where its pressure is what the rig file says, or simulated
-        with what it feeds.
+        """The block of one supply; none where its pressure is what the rig file says, what was
+        recorded whatever gives it, or simulated with what it feeds.
         """
         full, table = qualified("supply", name), self.rig.tables("supply")[name]
         behind = self.behind(full)
@@ -449,9 +450,8 @@ class _BlockMap:
             else (" and line" if table["kind"] != "regulator" else "")
         )
         covers += _called(name)
-        if not any(self.around(node) for node in nodes) or self._lacks_gauge(
-            full, "constant", "regulator"
-        ):
+        known = table["kind"] == "measured" or self._lacks_gauge(full, "constant", "regulator")
+        if known or not any(self.around(node) for node in nodes):
             return None
         if any(not path.command for node in nodes[1:] for path in self.around(node)):
             # noise of two gauges at a line goes both ways, and is drawn one way
@@ -559,6 +559,33 @@ class _BlockMap:
             anchor=chamber.window,
         )
 
+    def flow(self, name: str) -> Block | None:
+        """The block of what flows into a chamber, where that is measured: the pressures around it
+        and the commands to a flow.
+        """
+        full, channel = qualified("chamber", name), flows_of(self.rig)[name]
+        without_gauge = self.without_gauge(full)
+        drives = (
+            self.pressure(full),
+            *self.neighbours(full),
+            *self.commands(full),
+            *(dotted("supply_command", supply) for supply in without_gauge),
+            *(gauge for supply in without_gauge for gauge in self.in_front(supply)),
+        )
+        if not {channel, *drives, *self.angles} <= self.has or self.tubes_at(full):
+            return None
+        names = self.of_paths(full) | self.moved("supply", *without_gauge)
+        return Block(
+            dotted("flow", name),
+            channel,
+            drives,
+            None,  # nothing is integrated that could drift
+            frozenset(names | self.zeros(self.nodes_at(full), ())),
+            _GAS_STEP,
+            ("valve" if self.commands(full) else "line") + _called(name),
+            ("supply",) if without_gauge else (),
+        )
+
     def inlet(self, name: str) -> Block | Unjudged | None:
         """The block of a valve alone: what it feeds into a line at whose inlet a gauge stands."""
         full = qualified("line", name)
@@ -639,6 +666,7 @@ class _BlockMap:
             return None
         names = self.of("muscle", *pulling) | (set() if loaded else self.of_motion([joint]))
         names |= self.zeros([qualified("chamber", self.pulling[m]) for m in pulling], [joint])
+        names |= {"sensors.force_gain"} if loaded else set()
         return Block(
             "force" if loaded else qualified("torque", joint),
             channel,
@@ -707,6 +735,7 @@ def _all_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block | Unjudged]:
         *(have.inlet(name) for name in rig.tables("line")),
         *chambers,
         *(have.temperature(block) for block in chambers),
+        *(have.flow(name) for name in flows_of(rig)),
         *((have.arm(name) for name in rig.tables("joint")) if rig.tables("arm") else ()),
         *([have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else ()),
         *(have.pull(name) for name in pulls_of(rig)),

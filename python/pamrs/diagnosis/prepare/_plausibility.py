@@ -267,9 +267,11 @@ def _set_pressure(recording: Recording, rig: Rig, supply: str) -> tuple[float, s
     command where the rig file does.
 
     A regulator may be set to anything: its largest command tells, but for spikes; None where it was
-    not recorded.
+    not recorded, and of a supply that is only measured.
     """
     table = rig.tables("supply")[supply]
+    if table["kind"] == "measured":
+        return None
     if table["kind"] != "regulator":
         return float(table["initial_pressure"]), ""
     command = dotted("supply_command", supply)

@@ -215,8 +215,8 @@ def predicted(
     prepared : Prepared
         The recording.
     outlets : dict of str to float, optional
-        Where regulators without a gauge begin [Pa, gauge], by their full names; at the pressure of
-        what they feed by default.
+        Where regulators without a gauge begin [Pa, gauge], by their full names; by default where
+        the recording says, else at the pressure of what they feed.
     before : TimeBefore, optional
         What nobody measured begins as this leaves it, and not at rest.
 
@@ -245,10 +245,15 @@ def predicted(
         [],
         signals,
         lead + prepared.n,
-        outlets,
+        _outlets(prepared) | (outlets or {}),
         _anchors(block, prepared, starts, lead),
     )
     return prediction[lead:]
+
+
+def _outlets(prepared: Prepared) -> dict[str, float]:
+    """Pressures at which a recording says that regulators begin [Pa, gauge]."""
+    return {name: pressure for name, (pressure, _) in prepared.outlets.items()}
 
 
 def _anchors(block: Block, prepared: Prepared, starts: list[int], lead: int = 0) -> list[int]:
@@ -419,6 +424,7 @@ def _with_slopes(
         names,
         signals_at_starts(block, prepared, starts),
         prepared.n,
+        _outlets(prepared),
         anchors=_anchors(block, prepared, starts),
         **({} if given is None else given._asdict()),
     )

@@ -20,7 +20,7 @@ from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
-from pamrs.simulation import core_rig
+from pamrs.simulation import core_rig, supplies_of
 
 # chance that noise alone shortens the filter: a corner has to miss more (decision 22)
 _SMOOTHING_ODDS = 1e-3
@@ -101,6 +101,9 @@ class Prepared:
         Temperature at which a gas without a thermometer began [K], by the channel of its pressure:
         that of the room but where the recording begins in a transient. The first windows are freed
         of it.
+    outlets : dict of str to (float, float)
+        Where regulators begin at rest, as the recording states it, and how well that is known [Pa,
+        gauge; a standard deviation], by their full names.
     simulated : tuple of str
         Channels among the signals that nobody measured: pressures of tanks without a gauge.
     at_rest : frozenset of str
@@ -119,6 +122,7 @@ class Prepared:
     unsettled: dict[str, int] = field(default_factory=dict)
     after_holes: dict[str, Mask] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
+    outlets: dict[str, tuple[float, float]] = field(default_factory=dict)
     simulated: tuple[str, ...] = ()
     at_rest: frozenset[str] = frozenset()
     _start_states: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
@@ -525,7 +529,23 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         name: recording.commands.get(name, np.repeat(values, logged))
         for name, values in commands.items()
     }
-    return Prepared(recording, commands, as_logged, signals, raw, noise, lengths, settings, steps)
+    prepared = Prepared(
+        recording, commands, as_logged, signals, raw, noise, lengths, settings, steps
+    )
+    return replace(prepared, outlets=_stated_outlets(recording, rig))
+
+
+def _stated_outlets(recording: Recording, rig: Rig) -> dict[str, tuple[float, float]]:
+    """Pressures at which a recording says that regulators begin, and how well it knows them."""
+    outlets = {}
+    for supply in supplies_of(rig, "regulator"):
+        full = qualified("supply", supply)
+        name = f"{full}.initial_pressure"
+        stated = recording.parameters.get(name)
+        if stated is not None and stated.error != "own":
+            known = rig.parameter(name).tol if stated.error != "none" else 0.0
+            outlets[full] = (stated.value, known if math.isfinite(known) else 0.0)
+    return outlets
 
 
 def _looked_at(recording: Recording, rig: Rig, core: _core.Rig) -> list[str]:
@@ -533,7 +553,8 @@ def _looked_at(recording: Recording, rig: Rig, core: _core.Rig) -> list[str]:
     it does not have is left alone.
     """
     drives = [name for name in core.channels if channel_of(name) in DRIVES]
-    every = (*drives, *pulls_of(rig).values(), *thermometers_of(rig).values())
+    beside = (pulls_of(rig), thermometers_of(rig), flows_of(rig))
+    every = (*drives, *(name for channels in beside for name in channels.values()))
     return [name for name in every if name in recording.channels]
 
 
@@ -613,6 +634,15 @@ def pulls_of(rig: Rig) -> dict[str, str]:
     if rig.model["load"]:
         return {"": "force"}
     return {name: dotted("joint_torque", name) for name in rig.tables("joint")}
+
+
+def flows_of(rig: Rig) -> dict[str, str]:
+    """Channels of what flows into a rig's chambers through the valves and lines that lead to them,
+    by the names of those that have some.
+    """
+    ends = [e["to"] for block in ("valve", "line") for e in rig.ports(block).values()]
+    fed = [name for name in rig.tables("chamber") if qualified("chamber", name) in ends]
+    return {name: dotted("air_flow", name) for name in fed}
 
 
 def warm_chambers(rig: Rig) -> list[str]:
