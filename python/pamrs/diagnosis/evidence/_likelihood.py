@@ -17,10 +17,10 @@ from pamrs.diagnosis.noise import NoiseLevel, bins_of, means_in_noises
 from pamrs.diagnosis.prepare import Block, Prepared, Residual
 
 _ERROR_TIME = 1.0  # [s] correlation time of the leftover error (decision 14)
-# [noise levels of bin means] sizes of that error that are worked out (half a decade apart splines
-# are smooth), and those between that are tried
+# [noise levels of bin means] sizes of that error that are worked out: splines are smooth over half
+# a decade
 _SIZES = 10.0 ** np.arange(-1.0, 7.1, 0.5)
-_BETWEEN = 10.0 ** np.linspace(-1.0, 7.0, 321)
+_BETWEEN = 10.0 ** np.linspace(-1.0, 7.0, 321)  # those between that are tried
 _CURVE_DEVIATIONS = 2.0  # [standard deviations] height of a curve of the curve error at the most
 _LEAST_SQUARE = 1e-3  # square below which differences say nothing
 
