@@ -34,6 +34,12 @@ def test_conductance_of_the_other_flow_law_is_that_of_the_area() -> None:
     assert (found.value, found.tol) == pytest.approx((stated.value, stated.tol))
 
 
+def test_a_valve_that_lets_air_through_one_way_has_no_area_for_both() -> None:
+    (sonic,) = other_choices(SHOULDER, ("valve",))
+    one_way = sonic.rig.with_parameters({"valve.fill_conductance": 0.0})
+    assert list(other_choices(one_way, ("valve",))) == []
+
+
 @pytest.mark.parametrize(
     ("name", "other"), [("chamber.gas", "energy_balance"), ("muscle.model", "ferraresi")]
 )

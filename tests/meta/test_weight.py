@@ -33,7 +33,7 @@ PACKAGES = {
     "library": 71,
     "recordings": 5019,
     "report": 2067,
-    "rig": 2225,
+    "rig": 2227,
     "rigs": 141,
     "simulation": 1090,
     "studio": 663,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27716,
+    "tests": 27721,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1211,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37375
+MOST = 37377
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -104,6 +104,8 @@ def _in_other_form(rig: Rig, block: str, name: str) -> dict[str, Any]:
         return both | {f"{way}_critical_ratio": ratio for way in ("fill", "vent")}
     if name == "fill_conductance":
         fill, vent = (rig.parameters[f"{block}.{way}_conductance"] for way in ("fill", "vent"))
+        if fill.value * vent.value == 0.0:
+            raise RigError(f"rig {rig.name!r}: {block} lets air through one way, an orifice both")
         size = math.sqrt(fill.value * vent.value) / _SONIC_CONDUCTANCE
         known = {"value": size, "unit": "m2", "tol": fill.tol / fill.value * size}
         return {"discharge_area_max": known}
