@@ -25,14 +25,14 @@ PACKAGES = {
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11129,
+    "diagnosis": 11139,
     "effects": 404,
     "experiments": 1052,
     "findings": 947,
     "fit": 2936,
     "library": 71,
     "recordings": 5019,
-    "report": 2067,
+    "report": 2070,
     "rig": 2227,
     "rigs": 141,
     "simulation": 1090,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1211,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37377
+MOST = 37390
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -8,8 +8,8 @@ other and with "unlisted" on held-out recordings.
 
 Public are `diagnose`, `missing_input`, `Diagnosis`, `DiagnosisSettings`, and these packages and
 modules, each with its own list: `settings` (what a user may change), `result` (what is returned),
-`ready` (what is looked at before any fit), and the layers, lowest first: `prepare`, `fit`, `noise`,
-`missing`, `screen`, `evidence`, `search`, `model`, `limits`, `next_experiment`, `laws`, `explain`.
+and the layers, lowest first: `prepare`, `fit`, `noise`, `missing`, `screen`, `evidence`, `search`,
+`model`, `limits`, `next_experiment`, `laws`, `explain`.
 """
 
 from __future__ import annotations

@@ -352,18 +352,20 @@ class _Drawing:
 
     def _inside(self, kind: str, name: str) -> Iterable[str]:
         """Boxes of a block of the diagnosis: a chamber with what feeds it, a joint or a load with
-        its muscles; of a force or torque the muscles alone, of a temperature the chamber.
+        its muscles; of a force or torque the muscles alone, of a temperature the chamber, of a flow
+        what it passes.
         """
         target = dotted(MOVED.get(kind, kind), name)
         if target not in self.parts:
             return
-        if kind not in PULLS:
+        if kind not in (*PULLS, "flow"):
             yield target
         if kind == "chamber":  # an outlet that leads nowhere else
             led = {a for p in self.parts.values() for a in p.after}
             outlets = (p for p in self.parts.values() if p.kind == "line" and target in p.after)
             yield from (p.full for p in outlets if p.full not in led)
-        feeding = {"chamber": ("valve", "line"), "temperature": ()}.get(kind, ("muscle",))
+        paths = ("valve", "line")
+        feeding = {"chamber": paths, "flow": paths, "temperature": ()}.get(kind, ("muscle",))
         waiting = [target]
         while waiting:
             for before in self.parts[waiting.pop()].after:

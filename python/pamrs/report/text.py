@@ -262,6 +262,8 @@ def choice_words(effect: EffectFound, name: str) -> str:
     form = info.form(effect.form) if info else None
     own = next((p for p in form.parameters if p.name == name), None) if form else None
     found = effect.parameters[name]
+    if not is_number(found.value):
+        return ""
     if own is None or own.role != "choice":
         unit, factor = display_unit(found.unit, found.value)
         return "" if unit == found.unit else f"{format_number(factor * found.value)} {unit}"

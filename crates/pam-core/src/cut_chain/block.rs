@@ -59,10 +59,7 @@ impl Block {
                 .map(|(k, c)| (dotted("temperature", &c.name), Self::Temperature(k))),
         )
         .chain(
-            spec.chambers
-                .iter()
-                .enumerate()
-                .map(|(k, c)| (dotted("flow", &c.name), Self::Flow(k))),
+            spec.chambers.iter().enumerate().map(|(k, c)| (dotted("flow", &c.name), Self::Flow(k))),
         )
         .chain(rig.wiring.inlets.iter().enumerate().map(|(k, (line, _))| {
             (dotted("line", &spec.lines[*line].name), Self::Chamber(spec.chambers.len() + k))

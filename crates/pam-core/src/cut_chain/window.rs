@@ -195,9 +195,7 @@ impl<'a, S: Number> Cut<'a, S> {
                 let pull = plant.pull(*k, &course.state, &course.memory, scratch);
                 plant.at_cell(pull, time) + *rest
             }
-            Output::Flow(k, rest) => {
-                plant.metered(*k, &course.state, &course.last.spool) + *rest
-            }
+            Output::Flow(k, rest) => plant.metered(*k, &course.state, &course.last.spool) + *rest,
             Output::Temperature(k, off) => match plant.thermometer(*k) {
                 Some((reading, _)) => course.state[reading] + *off,
                 None => plant.temperature(*k, &course.state) + *off,
@@ -349,7 +347,8 @@ impl<'a, S: Number> Cut<'a, S> {
         }
         let held = self.measured.held;
         let last = (self.measured.samples * held) as i64 - 1;
-        let command = |input: usize, sample: i64| match self.measured.set_before(plant.rig(), input) {
+        let command = |input: usize, sample: i64| match self.measured.set_before(plant.rig(), input)
+        {
             Some(pressure) if sample < 0 => pressure,
             _ => commands[input][sample.clamp(0, last) as usize],
         };

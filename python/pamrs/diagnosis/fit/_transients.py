@@ -477,10 +477,16 @@ def _fit_jointly(
     wide = pieces_spread(
         values[:measured], jacobian[:measured], covariance, pieces_of(problem, by_block)
     )
-    alone = np.sqrt(np.clip(np.diag(covariance), 0.0, None))[count:]
-    # one piece or two tell of an event of one recording: their disagreement is no measure of it
-    every = np.array([not name for name, _ in vector.places])
-    spread = np.where(every, np.maximum(wide[count:], alone), alone)
+    white = np.sqrt(np.clip(np.diag(covariance), 1e-300, None))
+    # what no residual depends on is not known, although the inverse calls it zero
+    white[~np.any(jacobian[:measured], axis=0)] = np.inf
+    wide = np.maximum(wide, white)
+    # one piece or two tell of an event of one recording: their disagreement is no measure of it,
+    # that of what all recordings share is
+    every = np.array([True] * count + [not name for name, _ in vector.places])
+    known = every & np.isfinite(white)
+    coloured = float(np.median(wide[known] / white[known])) if known.any() else 1.0
+    spread = np.where(every, wide, coloured * white)[count:]
     std_of = dict(zip(vector.places, (spread * vector.scale).tolist(), strict=True))
     found = vector.events_at(x)
 

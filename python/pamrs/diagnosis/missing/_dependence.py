@@ -293,7 +293,7 @@ def _shown(value: float, unit: str) -> str:
 def _sense(missing: MissingInput, mean: float) -> str:
     """Direction of an input of one sign, in words."""
     noun = spoken_name(missing.block)
-    if missing.unit == "kg/s":
+    if missing.unit == "kg/s" and channel_of(missing.block) != "flow":
         return f" into the {noun}" if mean > 0.0 else f" out of the {noun}"
     more = "larger" if mean > 0.0 else "smaller"
     return f" towards a {more} {spoken_name(missing.position)}"

@@ -228,7 +228,7 @@ def outcome_of(
 
     problems = judged_alike(two_at_a_time(cut, zip(rigs, runs, strict=True)))
     own = two_at_a_time(lambda one: linear(*one), zip(problems, rigs, strict=True))
-    errors = errors_of(problems[0], rigs[0], [p for q in problems[1:] for p in q.recordings])
+    errors = errors_of(problems[0], own[0], [p for q in problems[1:] for p in q.recordings])
 
     def missed(pair: tuple[int, int]) -> ResidualDifference:
         i, j = pair

@@ -298,33 +298,35 @@ Errors = Mapping[Key, BinErrors]
 """By block and recording."""
 
 
-def errors_of(problem: Problem, rig: Rig, visited: Sequence[Prepared] = ()) -> Errors:
+def errors_of(problem: Problem, model: Linear, visited: Sequence[Prepared] = ()) -> Errors:
     """Noise and usual error of a model over the recordings of a problem.
 
     Parameters
     ----------
     problem : Problem
         Blocks and recordings.
-    rig : Rig
+    model : Linear
         A model close to them.
     visited : sequence of Prepared, optional
         Further recordings whose ranges the curves of that error run over.
     """
     fewer = replace(problem, settings=replace(problem.settings, noise_replicates=REPLICATES))
-    curve_errors = curve_errors_of(rig, problem.settings.usual_error)
-    levels = noise_levels(fewer, core_rig(rig), curve_errors, [*problem.recordings, *visited])
+    curve_errors = curve_errors_of(model.rig, problem.settings.usual_error)
+    visited = [*problem.recordings, *visited]
+    levels = noise_levels(fewer, core_rig(model.rig), curve_errors, visited)
     out = {}
     for prepared in problem.recordings:
         for block in problem.blocks:
-            level = levels[block.name, prepared.recording.name]
+            key = block.name, prepared.recording.name
+            level, base = levels[key], model.found[key]
             white = prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
             weight = max(1.0, level.binned_noise / white)
-            bins = max(1, prepared.n // bins_of(prepared))
+            _, counts = binned(base.value, base.rows, bins_of(prepared))
             # what differs is smooth over a bin: its mean square in all of them is that of a few
-            size = counted(prepared, block, problem.settings) / bins
+            size = counted(prepared, block, problem.settings) / max(1, int((counts > 0).sum()))
             scale = math.sqrt(size) / (weight * white)
-            error = np.zeros((bins, 0)) if level.curves is None else level.curves * scale
-            out[block.name, prepared.recording.name] = BinErrors(weight, scale, whitening(error))
+            error = np.zeros((counts.size, 0)) if level.curves is None else level.curves * scale
+            out[key] = BinErrors(weight, scale, whitening(error))
     return out
 
 

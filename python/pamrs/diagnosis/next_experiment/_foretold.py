@@ -50,7 +50,8 @@ def foretold(
         own = tuple(name for name in measurable(rig) if name in recording.channels)
         prepared = prepare(recording, rig, settings)
         problem = problem_of(rig, [prepared], own, settings)
-        left = misfit(problem, linear(problem, rig), errors_of(problem, rig))
+        model = linear(problem, rig)
+        left = misfit(problem, model, errors_of(problem, model))
         channels = {block.name: block.channel for block in problem.blocks}
         found[label] = {channels[block]: size for (block, _), size in left.rms.items()}
     return found

@@ -27,7 +27,7 @@ CurveErrors = Mapping[str, Mapping[str, float]]
 OperatingRanges = Mapping[str, tuple[float, float]]
 """Least value and width of each signal over some recordings, by channel [SI]."""
 
-_FLOWS = {"supply": ("supply", "line"), "chamber": ("line", "chamber")}
+_FLOWS = {"supply": ("supply", "line"), "chamber": ("line", "chamber"), "flow": ("line",)}
 """Blocks of a rig file whose share of error is one of the flow into a block, beside the valve."""
 _FACTORS = ("muscle", "transmission", "joint")
 """Blocks whose share of error multiplies the muscles' pull."""
@@ -138,7 +138,10 @@ def curves(
     if reading_error > 0.0:
         columns += [means(base.freed(reading_error * curve)) for curve in over(block.channel)]
     for place, share in _flow_errors(block, ranges, curve_errors):
-        moved = _flowing(share * np.column_stack(over(place)), base)
+        shares = share * np.column_stack(over(place))
+        # a flow is no state: what it is off by now is gone with the next sample
+        measured = block.kind == "flow"
+        moved = shares * base.prediction[:, None] if measured else _flowing(shares, base)
         columns += [means(base.freed(column)) for column in moved.T]
     for name, place, much in _drive_errors(block, prepared, ranges, curve_errors):
         columns += [

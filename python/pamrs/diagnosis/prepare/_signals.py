@@ -543,8 +543,9 @@ def _stated_outlets(recording: Recording, rig: Rig) -> dict[str, tuple[float, fl
         name = f"{full}.initial_pressure"
         stated = recording.parameters.get(name)
         if stated is not None and stated.error != "own":
-            known = rig.parameter(name).tol if stated.error != "none" else 0.0
-            outlets[full] = (stated.value, known if math.isfinite(known) else 0.0)
+            known = abs(stated.slope) * rig.parameter(name).tol if stated.slope else 0.0
+            if math.isfinite(known):
+                outlets[full] = (stated.value, known)
     return outlets
 
 
