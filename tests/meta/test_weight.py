@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27721,
+    "tests": 27722,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,

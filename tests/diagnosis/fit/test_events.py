@@ -156,8 +156,9 @@ def test_a_push_is_found_beside_a_persistent_effect() -> None:
     large = [e for e in push["events"] if e["torque"] > 2.5]
     first = {e["recording"]: e["time"] for e in sorted(large, key=lambda e: -e["time"])}
     assert all(abs(first[name] - when) < 0.3 for name, when in TIMES.items())
-    # the recording that stands for all is the one that tells most of its push
-    assert push["parameters"]["torque"]["value"] == pytest.approx(5.0, rel=0.05)
-    time = push["parameters"]["time"]
-    assert abs(time["value"] - TIMES["lower"]) < 2.0 * time["std"] < 0.4
+    # one recording stands for all, with what it knows of its push
+    time, torque = (push["parameters"][name] for name in ("time", "torque"))
+    assert torque["value"] == pytest.approx(5.0, rel=0.1)
+    assert abs(time["value"] - TIMES[push["events"][0]["recording"]]) < 0.3
+    assert time["std"] < 0.4
     assert found.rig.effects[0]["id"] == "muscle_hysteresis"

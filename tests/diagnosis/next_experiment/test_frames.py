@@ -65,7 +65,7 @@ def test_what_small_strokes_leave_open_is_settled_by_what_is_proposed(effect, st
     assert told.expected_information_bits > 0.5
     pair = next(p for p in told.pairs if set(p.between) == set(OPEN))
     assert pair.experiment
-    assert "mm" in pair.text
+    assert " cm" in pair.text  # the unit of the file
     others = [p for p in told.pairs if "unlisted" in p.between]
     assert all(p.experiment == "nested_strokes" for p in others)
     protocol = told.protocol
