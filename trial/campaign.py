@@ -32,7 +32,7 @@ from .design import SECOND, Spec, specs
 from .drive import FREE, Driver, course
 from .excitation import Excitation, Loop
 from .labs import Lab, table
-from .marks import HEALTHY, family, mark, opened
+from .marks import HEALTHY, distance_of, family, mark, opened
 from .plan import MANIFEST, SCHEMA
 from .recording import Array, run
 from .rig_kinds import nominal
@@ -51,8 +51,8 @@ _MARKS: Final = {
     "wrong values": "wrong",
     "false names": "false_name",
 }
-#: strata of the distance to the nearest rival from which the limits call a case decidable
-_DECIDABLE: Final = ("4 to 8", "8 to 16", "above 16")
+#: distance to the nearest rival from which the limits call a case decidable [standard deviations]
+_DECIDABLE: Final = 4.0
 #: share of the highest pressure recorded before above which a run broke its limit of 1.05
 _BROKEN: Final = 1.1
 _RIGS: Final = ("shoulder", "elbow", "hanging_mass")
@@ -291,10 +291,10 @@ def state_of(key: dict[str, Any], result: dict[str, Any] | None) -> str:
 def scored(out: Path, names: Sequence[str]) -> dict[str, list[dict[str, Any]]]:
     """By arm and number of runs: states, marks as (right, asked), and the time at the bench."""
     found: dict[str, list[dict[str, Any]]] = {arm: [] for arm in ARMS}
+    keys = {n: json.loads((out / "keys" / f"{n}.json").read_text(encoding="utf-8")) for n in names}
     for arm, count in itertools.product(ARMS, range(RUNS + 1)):
         states, decidable, seconds, own = [], [], [], []
-        for name in names:
-            key = json.loads((out / "keys" / f"{name}.json").read_text(encoding="utf-8"))
+        for name, key in keys.items():
             file = out / "results" / name / f"{arm}_{count}.json"
             if not file.is_file():
                 continue
@@ -302,7 +302,7 @@ def scored(out: Path, names: Sequence[str]) -> dict[str, list[dict[str, Any]]]:
             states.append(state_of(key, told["result"]))
             own.append(mark(key, told["result"]))
             seconds.append(float(told["seconds"]))
-            if set(own[-1].tags.get("distance", ())) & set(_DECIDABLE):
+            if (distance_of(key, told["result"]) or 0.0) >= _DECIDABLE:
                 decidable.append(states[-1])
         row: dict[str, Any] = {state: states.count(state) for state in STATES}
         row["decidable"] = decidable.count("right"), len(decidable)
@@ -338,31 +338,27 @@ def _most(log: Path) -> float:
 
 def page(found: dict[str, list[dict[str, Any]]], cases: int, ratios: Sequence[float] = ()) -> str:
     """The scores as tables, with how far pressures of the campaign went above what was recorded."""
+    every = [((arm, str(n)), row) for arm, rows in found.items() for n, row in enumerate(rows)]
     states = rows_of(
         ("arm", "runs", *STATES, "right, 95 %", "d >= 4: right", "wrong", "s at the bench"),
         [
-            (arm, str(count), *(str(row[state]) for state in STATES), _interval(row))
+            (*place, *(str(row[state]) for state in STATES), _interval(row))
             + (_share(row["decidable"]), _share(row["decidable wrong"]), f"{row['seconds']:.0f}")
-            for arm, rows in found.items()
-            for count, row in enumerate(rows)
+            for place, row in every
         ],
     )
     columns = (*_MARKS, "intervals")
     marks = rows_of(
         ("arm", "runs", *columns),
-        [
-            (arm, str(count), *(_share(row[column]) for column in columns))
-            for arm, rows in found.items()
-            for count, row in enumerate(rows)
-        ],
+        [(*place, *(_share(row[column]) for column in columns)) for place, row in every],
     )
     over = f"{max(ratios):.2f}" if ratios else "none"
     broken = sum(ratio > _BROKEN for ratio in ratios)
-    text = (
+    return (
+        f"# Campaigns on the independent plant, {cases} cases\n\n{states}\n\n{marks}\n\n"
         "Highest pressure of the runs of a campaign, as a share of the highest one recorded "
-        f"before: {over}; above {_BROKEN:g} in {broken} of {len(ratios)} cases."
+        f"before: {over}; above {_BROKEN:g} in {broken} of {len(ratios)} cases.\n"
     )
-    return f"# Campaigns on the independent plant, {cases} cases\n\n{states}\n\n{marks}\n\n{text}\n"
 
 
 def _share(counts: tuple[int, int]) -> str:
@@ -371,8 +367,8 @@ def _share(counts: tuple[int, int]) -> str:
 
 def _interval(row: dict[str, Any]) -> str:
     """Share of the cases that are right, as an interval of 95 %."""
-    low, high = wilson(row["right"], max(1, sum(row[state] for state in STATES)))
-    return f"{low:.2f} to {high:.2f}"
+    cases = sum(row[state] for state in STATES)
+    return "{:.2f} to {:.2f}".format(*(wilson(row["right"], cases) if cases else (0.0, 1.0)))
 
 
 def draw(found: dict[str, list[dict[str, Any]]], file: Path) -> None:

@@ -344,7 +344,7 @@ def _own(key: dict[str, Any]) -> tuple[str, ...]:
     return (_stratum(min(sizes), (1.5, 3.0, 10.0, 100.0)),)
 
 
-def _distance(key: dict[str, Any], result: dict[str, Any] | None) -> float | None:
+def distance_of(key: dict[str, Any], result: dict[str, Any] | None) -> float | None:
     """How far the clearest effect of a case is from its nearest rival, by the limits of the result
     [standard deviations]: in proportion to what it leaves; None without limits.
     """
@@ -360,7 +360,7 @@ def _distance(key: dict[str, Any], result: dict[str, Any] | None) -> float | Non
 def _tags(key: dict[str, Any], result: dict[str, Any] | None) -> dict[str, tuple[str, ...]]:
     """The strata of a case."""
     spec, effects = key["spec"], key["effects"]
-    distance = _distance(key, result)
+    distance = distance_of(key, result)
     lab, percent = spec["lab"], int(spec["percent"])
     marks = {e["mark"] for e in effects}
     kind = "effect" if effects else "healthy"

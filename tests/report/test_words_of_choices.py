@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pamrs.findings import EffectFound, EffectParameterFound
-from pamrs.report.text import choice_words
+from pamrs.report.text import value_words
 
 
 @pytest.mark.parametrize(
@@ -17,5 +17,5 @@ def test_the_place_of_a_gauge_is_said(value: float, said: str) -> None:
         "conductance": EffectParameterFound(1e-8, 1e-9, "m3/(s Pa)"),
     }
     effect = EffectFound("tube_flow_restriction", probability=0.9, name="hose", parameters=own)
-    assert choice_words(effect, "tap") == said
-    assert choice_words(effect, "conductance") == ""
+    assert value_words(effect, "tap") == said
+    assert value_words(effect, "conductance") == ""

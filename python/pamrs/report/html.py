@@ -249,7 +249,7 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
             if name in vague:
                 continue
             title = f"{closest}{words.label(effect.term)}: {words.label(name)}"
-            usual = bench.get(words.label(name)) or words.choice_words(effect, name)
+            usual = bench.get(words.label(name)) or words.value_words(effect, name)
             told = _typeset(usual)
             value = words.format_uncertain(own.value, own.std)
             rows.append((title, "", told, value, _span(words.span95(own)), _unit(own.unit)))

@@ -39,7 +39,7 @@ def summary(diagnosis: Findings) -> str:
             if name not in vague:
                 value = words.format_uncertain(own.value, own.std, unicode=False)
                 told = with_unit(f"  {name} = {value}", own.unit)
-                usual = bench.get(words.label(name)) or words.choice_words(effect, name)
+                usual = bench.get(words.label(name)) or words.value_words(effect, name)
                 lines.append(f"{told}: {usual}" if usual else told)
         if vague:
             names = f"  these recordings do not determine {', '.join(vague)}"

@@ -254,7 +254,7 @@ def undetermined(effect: EffectFound) -> list[str]:
     ]
 
 
-def choice_words(effect: EffectFound, name: str) -> str:
+def value_words(effect: EffectFound, name: str) -> str:
     """Words for the value of a choice, ``the gauge is at the valve``; a number in the unit that
     people read, empty where that is the SI unit.
     """

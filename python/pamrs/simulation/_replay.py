@@ -27,6 +27,8 @@ _STATES = {
     "joint_angle": ("joint", "angle_zero"),
     "length": ("load", "length_zero"),
 }
+#: Pressures that a run is given, and the channels of a recording that they come from.
+_PRESCRIBED = {"pressure": "muscle_pressure", "supply_pressure": "supply_pressure"}
 
 
 def replay(
@@ -71,10 +73,8 @@ def replay(
     """
     rig = recording.rig_there(rig)
     drive = _drive(rig, recording)
-    prescribed = {
-        "muscle_pressure": drive.get("pressure", {}),
-        "supply_pressure": drive.get("supply_pressure", {}),
-        "length": drive.get("length"),
+    prescribed: dict[str, Any] = {"length": drive.get("length")} | {
+        channel: drive.get(signal, {}) for signal, channel in _PRESCRIBED.items()
     }
     initial = {}
     for channel, (block, _) in _STATES.items():
@@ -169,9 +169,8 @@ def differences(result: Simulation, recording: Recording) -> dict[str, float]:
         Channel -> difference in its SI unit.
     """
     drive = _drive(result.rig, recording)
-    given = {"pressure": "muscle_pressure", "supply_pressure": "supply_pressure"}
-    skipped = {"time", "valve_command", "supply_command", *drive} - {*given}
-    for signal, channel in given.items():
+    skipped = {"time", "valve_command", "supply_command", *drive} - {*_PRESCRIBED}
+    for signal, channel in _PRESCRIBED.items():
         skipped |= {dotted(channel, name) for name in drive.get(signal, ())}
     found = {}
     for name in result:
