@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from .campaign import RIGS as CAMPAIGN_RIGS
 from .campaign import draw, highest, scored, specs_of_campaigns, trial_of_campaigns
 from .campaign import page as campaign_page
 from .concealed import make_case, write
@@ -269,6 +270,9 @@ def _add_campaign(add: Add) -> None:
     whole.add_argument("--seed", type=int, required=True)
     whole.add_argument("--cases", type=int, default=24, help="default 24")
     whole.add_argument("--jobs", type=int, default=1, help="cases at a time (default 1)")
+    whole.add_argument(
+        "--rigs", nargs="+", choices=CAMPAIGN_RIGS, default=CAMPAIGN_RIGS, help="default: all five"
+    )
     whole.set_defaults(run=_campaign)
 
 
@@ -279,8 +283,9 @@ def _campaign(args: argparse.Namespace) -> None:
     def told(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
-    trial_of_campaigns(args.folder, args.seed, args.cases, args.jobs, told)
-    names = [spec.name for spec in specs_of_campaigns(args.seed, args.cases)]
+    wanted = specs_of_campaigns(args.seed, args.cases, args.rigs)
+    trial_of_campaigns(args.folder, wanted, args.jobs, told)
+    names = [spec.name for spec in wanted]
     found = scored(args.folder, names)
     draw(found, args.folder / "campaign.svg")
     ratios = highest(args.folder, names)

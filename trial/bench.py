@@ -11,6 +11,7 @@ import numpy as np
 from .design import Spec
 from .drive import Driver, course
 from .effects import Effect, Effects
+from .excitation import Excitation
 from .families import most
 from .pair.places import Placed
 from .plant import Parameters, Plant
@@ -91,12 +92,16 @@ class Bench:
         """Noise of every channel."""
         return self.noise.floor()
 
-    def drive(self, name: str, rng: np.random.Generator) -> tuple[Any, Any, Array | None]:
-        """Course, controller and, of an open loop, the commands of a recording."""
+    def drive(
+        self, name: str, rng: np.random.Generator, seconds: float | None = None
+    ) -> tuple[Any, Any, Array | None]:
+        """Course, controller and, of an open loop, the commands of a recording, as long as those of
+        the case or of `seconds`.
+        """
+        duration = self.spec.duration if seconds is None else seconds
         if self.spec.rig == "blow_down":
-            n = round(self.spec.duration / self.step)
-            return None, None, np.full(n, -1.0)
-        shape = course(self.rig, name, self.spec.duration, self.step, rng)
+            return still(np.full(round(duration / self.step), -1.0))
+        shape = course(self.rig, name, duration, self.step, rng)
         period = self.step * self.spec.lab.held
         return shape, Driver(nominal(self.spec.rig)[2], self.rig, period, rng), None
 
@@ -116,17 +121,26 @@ class Bench:
 
     def recorded(self, plant: Any, index: int) -> Record:
         """One recording of a plant."""
-        shape, driver, command = self.drives[index]
         rng = np.random.default_rng([self.spec.seed, index, 78])
+        return self.record(plant, self.drives[index], self.supply[index], index, rng)
+
+    def record(
+        self,
+        plant: Any,
+        drive: tuple[Any, Any, Array | None],
+        supply: float,
+        index: int,
+        rng: np.random.Generator,
+    ) -> Record:
+        """A recording of a plant that is driven as :meth:`drive` gives, with a pressure of the tank
+        at its beginning [gauge Pa] and a number among the recordings of the case.
+        """
         start = None
-        if command is not None:
-            begin = self.supply[index] + plant.par.ambient
-            start = plant.initial(begin, 2.0e5, 0.0, 0.0, 1000.0 * index)
-            shape, driver = _still(len(command)), _nobody
+        if self.spec.rig == "blow_down":
+            start = plant.initial(supply + plant.par.ambient, 2.0e5, 0.0, 0.0, 1000.0 * index)
         return run(
-            plant, shape, driver, command, self.supply[index], self.noise, rng, index,
-            self.step, self.spec.lab.held, start,
-        )  # fmt: skip
+            plant, *drive, supply, self.noise, rng, index, self.step, self.spec.lab.held, start
+        )
 
     def against(self, records: dict[int, Record], model: dict[str, Any]) -> Measured:
         """How far records lie from the plant of a model without effects, in every channel."""
@@ -273,11 +287,8 @@ class _Nobody:
         return 0.0
 
 
-_nobody = _Nobody()
-
-
-def _still(count: int) -> Any:
-    from .excitation import Excitation
-
-    zero = np.zeros(count)
-    return Excitation(zero, zero.astype(bool), zero, zero.astype(bool))
+def still(commands: Array) -> tuple[Any, Any, Array]:
+    """Course, controller and commands where these are played, and nothing is controlled."""
+    zero = np.zeros(len(commands))
+    none = zero.astype(bool)
+    return Excitation(zero, none, zero, none), _Nobody(), commands

@@ -25,17 +25,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from .bench import Bench
+from .bench import still
 from .cases import Concealed, concealed, make
 from .concealed import case_toml, store, stored_key, write
-from .design import SECOND, Spec, specs
-from .drive import FREE, Driver, course
-from .excitation import Excitation, Loop
+from .design import ROUND, THIRD, Spec, specs
+from .drive import FREE
+from .excitation import Loop
 from .labs import Lab, table
 from .marks import HEALTHY, distance_of, family, mark, opened
+from .pair.places import SIDES
 from .plan import MANIFEST, SCHEMA
-from .recording import Array, run
-from .rig_kinds import nominal
+from .recording import Array
+from .rig_kinds import PAIR
 from .summary import table as rows_of
 from .summary import wilson
 
@@ -55,7 +56,7 @@ _MARKS: Final = {
 _DECIDABLE: Final = 4.0
 #: share of the highest pressure recorded before above which a run broke its limit of 1.05
 _BROKEN: Final = 1.1
-_RIGS: Final = ("shoulder", "elbow", "hanging_mass")
+RIGS: Final = ("shoulder", "elbow", "hanging_mass", "regulated_joint", PAIR)
 #: what happens once in each recording that was planned, and in no other one
 _EVENTS: Final = ("external_torque", "payload_change")
 _SECONDS: Final = 30.0
@@ -64,17 +65,27 @@ _RATE: Final = 100
 TIMEOUT: Final = 3600.0
 
 
-def specs_of_campaigns(seed: int, cases: int) -> list[Spec]:
-    """The first cases: those of the second plan on rigs with one valve, each with one free log."""
+def specs_of_campaigns(seed: int, cases: int, rigs: Sequence[str] = RIGS) -> list[Spec]:
+    """The first cases: those of the third plan on some rigs, each with one free log."""
     found: list[Spec] = []
-    for spec in specs(seed, 6 * cases + 24, _SECONDS, SECOND):
-        events = any(label.split("/")[0] in _EVENTS for label in spec.forms)
-        if spec.rig not in _RIGS or events or len(found) == cases:
-            continue
-        lab = Lab(_RATE, max(spec.lab.bits, 12), one=True)
-        name = f"campaign_{len(found) + 1:04d}"
-        found.append(replace(spec, name=name, lab=lab, recordings=((FREE, "fit"),)))
-    return found
+    every = 0
+    while len(found) < cases:
+        every += 4 * ROUND
+        found = [spec for spec in specs(seed, every, _SECONDS, THIRD) if _is_taken(spec, rigs)]
+    return [
+        replace(
+            spec,
+            name=f"campaign_{k:04d}",
+            lab=Lab(_RATE, max(spec.lab.bits, 12), one=True),
+            recordings=((FREE, "fit"),),
+        )
+        for k, spec in enumerate(found[:cases], 1)
+    ]
+
+
+def _is_taken(spec: Spec, rigs: Sequence[str]) -> bool:
+    """Whether a case is on one of some rigs, and the same in each of its recordings."""
+    return spec.rig in rigs and not any(label.split("/")[0] in _EVENTS for label in spec.forms)
 
 
 class _Case:
@@ -94,39 +105,35 @@ class _Case:
             self._drawn = concealed(self.spec)
         return self._drawn
 
-    def recorded(self, index: int, shape: Excitation, driver: Any, command: Array | None) -> str:
+    def recorded(self, index: int, drive: Any, own: np.random.Generator) -> str:
         """A run of the plant as a log: of a controller, or of commands."""
         drawn, bench = self.drawn, self.drawn.bench
         plant = bench.plant(bench.par, [*drawn.effects, *drawn.errors])
-        own = np.random.default_rng([self.spec.seed, index, 79])
         sigma = bench.tolerance.get("supply.initial_pressure", 0.0)
         supply = bench.begins(0) + float(own.uniform(-1.0, 1.0)) * sigma
-        held = 1 if command is not None else self.spec.lab.held
-        record = run(
-            plant, shape, driver, command, supply, bench.noise, own, index, bench.step, held
-        )
+        record = bench.record(plant, drive, supply, index, own)
         rest = float(bench.true.get("muscle", {}).get("rest_length", 0.0))
         return table(record, bench.rig, self.spec.lab, [], rest)[0]
 
     def played(self, index: int, commands: Path) -> str:
         """Commands of a file, played on the plant."""
-        rows = np.loadtxt(commands, delimiter=",", skiprows=1, ndmin=2)
-        count = round(float(rows[-1, 0]) / self.drawn.bench.step) + 1
-        times = np.arange(count) * self.drawn.bench.step
-        held = np.searchsorted(rows[:, 0], times + 1e-6, side="right") - 1
-        command = np.array([Loop.quantise(float(v)) for v in rows[held, 1]])
-        zero = np.zeros(count)
-        shape = Excitation(zero, zero.astype(bool), zero, zero.astype(bool))
-        return self.recorded(index, shape, _Nobody(), command)
+        sent = _Sent(commands)
+        step = self.drawn.bench.step
+        times = np.arange(round(sent.time[-1] / step) + 1) * step
+        held = np.searchsorted(sent.time, times + 1e-6, side="right") - 1
+        places = [f".{side}" for side in SIDES] if self.spec.rig == PAIR else [""]
+        columns = [
+            [Loop.quantise(value) for value in sent.of(place)[held].tolist()] for place in places
+        ]
+        values = np.column_stack(columns) if self.spec.rig == PAIR else np.array(columns[0])
+        own = np.random.default_rng([self.spec.seed, index, 79])
+        return self.recorded(index, still(values), own)
 
     def driven(self, index: int, name: str, seconds: float) -> str:
         """A course of the trial, with its controller."""
-        bench: Bench = self.drawn.bench
         own = np.random.default_rng([self.spec.seed, index, 81])
-        shape = course(bench.rig, name, seconds, bench.step, own)
-        period = bench.step * self.spec.lab.held
-        driver = Driver(nominal(self.spec.rig)[2], bench.rig, period, own)
-        return self.recorded(index, shape, driver, None)
+        drive = self.drawn.bench.drive(name, own, seconds)
+        return self.recorded(index, drive, own)
 
     def result(self, arm: str, count: int) -> Path:
         """Where the result of an arm after some runs is kept."""
@@ -138,14 +145,20 @@ class _Case:
         write(self.result(arm, count), json.dumps({"seconds": seconds, "result": told}) + "\n")
 
 
-class _Nobody:
-    """Where commands are played nothing is controlled."""
+class _Sent:
+    """Commands of a file: times [s], and by their headings volts, or bar of a regulator."""
 
-    def reset(self) -> None:
-        """Nothing to forget."""
+    def __init__(self, file: Path) -> None:
+        head = file.read_text(encoding="utf-8").split("\n", 1)[0]
+        self.names = [cell.split(" [")[0] for cell in head.split(",")[1:]]
+        self.units = [cell.rpartition("[")[2].rstrip("]") for cell in head.split(",")[1:]]
+        rows = np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2)
+        self.time, self.values = rows[:, 0], rows[:, 1:]
 
-    def __call__(self, *_: Any) -> float:
-        return 0.0
+    def of(self, place: str) -> Array:
+        """Command of the valve at a place of a pair, or of the one that there is."""
+        at = next(k for k, name in enumerate(self.names) if name.endswith(place))
+        return self.values[:, at] * {"Pa": 1.0e-5, "kPa": 1.0e-2}.get(self.units[at], 1.0)
 
 
 def _pamrs(words: Sequence[str | Path], log: Path) -> int:
@@ -235,11 +248,10 @@ def run_case(given: tuple[Path, Spec]) -> str:
 
 
 def trial_of_campaigns(
-    out: Path, seed: int, cases: int, jobs: int, say: Callable[[str], None]
+    out: Path, wanted: Sequence[Spec], jobs: int, say: Callable[[str], None]
 ) -> None:
     """Write keys, digests and free logs, then run every case; what is there is kept."""
     manifest = out / MANIFEST
-    wanted = specs_of_campaigns(seed, cases)
     digests: dict[str, str] = {}
     if manifest.is_file():
         digests = json.loads(manifest.read_text(encoding="utf-8"))["keys"]
@@ -324,16 +336,18 @@ def highest(out: Path, names: Sequence[str]) -> list[float]:
     found = []
     for name in names:
         runs = sorted((out / "work" / name / "campaign").glob("step_*/recording_*.csv"))
-        most = [_most(file) for file in (out / "cases" / name / f"{FREE}.csv", *runs)]
-        found += [max(most[1:]) / most[0]] if runs else []
+        before = _most(out / "cases" / name / f"{FREE}.csv")
+        ratios = [most / before[n] for file in runs for n, most in _most(file).items()]
+        found += [max(ratios)] if ratios else []
     return found
 
 
-def _most(log: Path) -> float:
-    """Highest muscle pressure of a log, in its own unit."""
+def _most(log: Path) -> dict[str, float]:
+    """Highest pressure of each muscle of a log, in its own unit."""
     head, *rows = log.read_text(encoding="utf-8").splitlines()
-    at = next(k for k, cell in enumerate(head.split(",")) if cell.startswith("muscle_pressure"))
-    return max(float(cell) for row in rows if (cell := row.split(",")[at]))
+    places = {n: k for k, n in enumerate(head.split(",")) if n.startswith("muscle_pressure")}
+    cells = [row.split(",") for row in rows]
+    return {name: max(float(row[k]) for row in cells if row[k]) for name, k in places.items()}
 
 
 def page(found: dict[str, list[dict[str, Any]]], cases: int, ratios: Sequence[float] = ()) -> str:

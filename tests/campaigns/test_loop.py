@@ -2,6 +2,7 @@
 what follows from them is asked.
 """
 
+import itertools
 import json
 import subprocess
 import sys
@@ -128,6 +129,19 @@ def test_a_run_is_foretold_played_scored_and_kept(rig, pool, diagnosed, tmp_path
     # the same call again finds nothing more to do
     again = campaign(SimulatedBench(rig), rig, log(rig, tmp_path, pool), out=out, bench=FAST)
     assert (again.why, len(again.steps)) == ("decided", 1)
+
+
+@pytest.mark.parametrize(
+    "name", ["shoulder", "antagonistic_joint", "regulated_joint", "two_joint_arm"]
+)
+def test_an_experiment_is_like_itself_as_a_file_holds_it(name):
+    own = library(pamrs.rigs.named(name), DiagnosisSettings())
+    assert own
+    for one, other in itertools.product(own, own):
+        numbers = json.loads(json.dumps(one.excitation))
+        assert _choice.alike(other, one.name, numbers) == (one is other)
+    moved = {key: value for key, value in own[0].excitation.items() if key != "kind"} | {"kind": ""}
+    assert not _choice.alike(own[0], own[0].name, moved)
 
 
 def test_a_run_that_failed_is_kept_and_played_again(rig, pool, diagnosed, tmp_path):

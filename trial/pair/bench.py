@@ -35,31 +35,33 @@ class PairBench(Bench):
     def floors(self) -> Array:
         return self.noise.floor()[list(KINDS)]
 
-    def drive(self, name: str, rng: np.random.Generator) -> tuple[Any, Any, Array | None]:
-        shape = pair_course(self.rig, name, self.spec.duration, self.step, rng)
-        return (
-            shape,
-            PairDriver(nominal_pair(), self.rig, self.step * self.spec.lab.held, rng),
-            None,
-        )
+    def drive(
+        self, name: str, rng: np.random.Generator, seconds: float | None = None
+    ) -> tuple[Any, Any, Array | None]:
+        duration = self.spec.duration if seconds is None else seconds
+        shape = pair_course(self.rig, name, duration, self.step, rng)
+        period = self.step * self.spec.lab.held
+        return shape, PairDriver(nominal_pair(), self.rig, period, rng), None
 
     def plant(self, numbers: Any, effects: Sequence[Any] = ()) -> PairPlant:
         return PairPlant(numbers, effects)
 
-    def recorded(self, plant: Any, index: int) -> Record:
-        shape, driver, _ = self.drives[index]
+    def record(
+        self,
+        plant: Any,
+        drive: tuple[Any, Any, Array | None],
+        supply: float,
+        index: int,
+        rng: np.random.Generator,
+    ) -> Record:
+        shape, driver, command = drive
         driver.reset()
-        return run_pair(
-            plant,
-            shape,
-            lambda i, measured: driver.on(shape, i, measured),
-            self.supply[index],
-            self.noise,
-            np.random.default_rng([self.spec.seed, index, 78]),
-            index,
-            self.step,
-            self.spec.lab.held,
-        )
+        held = self.spec.lab.held if command is None else 1
+
+        def steering(i: int, measured: tuple[float, ...]) -> tuple[float, float]:
+            return driver.on(shape, i, measured) if command is None else tuple(command[i].tolist())
+
+        return run_pair(plant, shape, steering, supply, self.noise, rng, index, self.step, held)
 
     def followed(
         self, plant: Any, record: Record, index: int, name: str = "", step: float = 0.0

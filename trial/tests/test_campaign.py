@@ -18,6 +18,7 @@ from trial.campaign import (
     specs_of_campaigns,
     state_of,
 )
+from trial.rig_kinds import PAIR
 
 
 def test_a_case_of_a_seed_is_the_same_however_many_are_made():
@@ -80,7 +81,7 @@ def test_a_result_is_right_wrong_or_open(truth, said, state):
 
 
 def test_the_plant_plays_commands_as_they_are_written(tmp_path):
-    spec = next(spec for spec in specs_of_campaigns(7, 24) if not spec.forms)
+    spec = next(spec for spec in specs_of_campaigns(7, 24, ["shoulder"]) if not spec.forms)
     case = _Case(tmp_path, spec)
     times = np.arange(401) * 0.005
     sent = 5.0 + 0.4 * (times > 0.5) - 0.8 * (times > 1.2)
@@ -94,6 +95,36 @@ def test_the_plant_plays_commands_as_they_are_written(tmp_path):
     pressure = table[:, 3]
     assert pressure[table[:, 0] < 0.5] == pytest.approx(0.0, abs=0.05)
     assert pressure[(table[:, 0] > 1.0) & (table[:, 0] < 1.2)].min() > 0.05
+
+
+@pytest.mark.parametrize(
+    ("rig", "unit", "bars"),
+    [("regulated_joint", "Pa", 1e5), ("regulated_joint", "bar", 1.0), (PAIR, "V", 1.0)],
+)
+def test_regulators_and_pairs_play_their_commands(tmp_path, rig, unit, bars):
+    spec = next(spec for spec in specs_of_campaigns(7, 24, [rig]) if not spec.forms)
+    case = _Case(tmp_path, spec)
+    names = (
+        ["valve_command.extensor", "valve_command.flexor"] if rig == PAIR else ["supply_command"]
+    )
+    times = np.arange(201) * 0.01
+    levels = {"valve_command.flexor": 5.5, "valve_command.extensor": 4.0, "supply_command": 2.0}
+    rows = [",".join(f"{v:.9g}" for v in (t, *(levels[n] * bars for n in names))) for t in times]
+    head = ",".join(["time [s]", *(f"{name} [{unit}]" for name in names)])
+    (tmp_path / "commands.csv").write_text("\n".join([head, *rows]) + "\n")
+    head, *log = case.played(1, tmp_path / "commands.csv").splitlines()
+    table = np.array([[float(cell) for cell in line.split(",")] for line in log])
+    columns = {cell.split(" [")[0]: table[:, k] for k, cell in enumerate(head.split(","))}
+    for name in names:
+        assert columns[name] == pytest.approx(levels[name], abs=0.0025)
+    if rig == PAIR:
+        for side, way in (("flexor", 1.0), ("extensor", -1.0)):  # filled, and vented
+            pressure = columns[f"muscle_pressure.{side}"]
+            assert way * (pressure[-1] - pressure[0]) > 0.4
+    else:
+        assert columns["muscle_pressure"][-1] == pytest.approx(2.0, abs=0.2)
+    driven = case.driven(11, "multisine", 3.0).splitlines()
+    assert len(driven) == 301
 
 
 def test_what_is_there_is_scored_and_the_page_has_every_arm(tmp_path):

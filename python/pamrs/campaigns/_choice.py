@@ -4,6 +4,7 @@ most of what is open.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -125,18 +126,19 @@ def pool_of(
 
 def alike(experiment: Experiment, name: str, numbers: Mapping[str, Any]) -> bool:
     """True where an experiment is one of this kind and level."""
-    own = experiment.excitation
-    if experiment.name != name or own.keys() != numbers.keys():
-        return False
-    for key, value in own.items():
-        if isinstance(value, str):
-            if value != numbers[key]:
-                return False
-            continue
-        one, other = (np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in (value, numbers[key]))
-        if one.shape != other.shape or not np.allclose(one, other, rtol=_LEVELS):
-            return False
-    return True
+    return experiment.name == name and _near(experiment.excitation, numbers)
+
+
+def _near(value: Any, other: Any) -> bool:
+    """True where two settings of an experiment are alike: words, numbers, or many of these."""
+    if isinstance(value, Mapping) and isinstance(other, Mapping):
+        return value.keys() == other.keys() and all(_near(value[key], other[key]) for key in value)
+    one, two = (v.tolist() if isinstance(v, np.ndarray) else v for v in (value, other))
+    if isinstance(one, (list, tuple)) and isinstance(two, (list, tuple)):
+        return len(one) == len(two) and all(map(_near, one, two))
+    if isinstance(one, (int, float)) and isinstance(two, (int, float)):
+        return math.isclose(one, two, rel_tol=_LEVELS)
+    return bool(one == two)
 
 
 def shows_of(plan: Plan) -> dict[str, list[str]]:
