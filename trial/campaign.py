@@ -37,6 +37,7 @@ from .pair.places import SIDES
 from .plan import MANIFEST, SCHEMA
 from .recording import Array
 from .rig_kinds import PAIR
+from .rig_kinds import RIGS as RIG_KINDS
 from .summary import table as rows_of
 from .summary import wilson
 
@@ -183,8 +184,13 @@ def _quiet() -> dict[str, str]:
 def _campaign(case: _Case) -> list[float]:
     """The arm that chooses its runs; how long each was [s]."""
     home, log = case.work / "campaign", case.work / "campaign.log"
-    free = case.case / f"{FREE}.csv"
-    words: list[str | Path] = ["campaign", case.case / "rig.toml", "--log", free, "--out", home]
+    free, rig = case.case / f"{FREE}.csv", case.work / "rig.toml"
+    told = (case.case / "rig.toml").read_text(encoding="utf-8")
+    if case.spec.rig == "regulated_joint":  # somebody has to say how far it may be set
+        most = RIG_KINDS[case.spec.rig].most
+        told += f'\n[limits]\nmax_pressure = {{ value = {most}, unit = "Pa" }}\n'
+    write(rig, told)
+    words: list[str | Path] = ["campaign", rig, "--log", free, "--out", home]
     words += ["--step", "--unattended", "--minutes", "60", "--air", "1e6", "--runs", str(RUNS)]
     state, ended = home / "campaign.json", case.result("campaign", RUNS).is_file()
     for count in range(RUNS + 1):
