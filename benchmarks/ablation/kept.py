@@ -24,7 +24,7 @@ from unittest.mock import patch
 
 from pamrs._losses import Losses
 from pamrs.diagnosis import diagnose
-from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, Weighing
+from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, Prior
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.search import Mismatch
 from pamrs.errors import PamrsError
@@ -42,13 +42,13 @@ class Weighed:
         The baseline first; without residuals.
     suspects : list of Block
         Blocks by which they were compared.
-    weighing : Weighing
+    prior : Prior
         Prices.
     """
 
     candidates: list[FittedHypothesis]
     suspects: list[Block]
-    weighing: Weighing
+    prior: Prior
 
 
 def _light(candidate: FittedHypothesis) -> FittedHypothesis:
@@ -73,7 +73,7 @@ def _recorded(without: str) -> Iterator[tuple[list[Weighed], set[str]]]:
             # of an undivided mismatch more blocks may be compared than have an excess
             compared = self.search.attempts.compared if len(groups) == 1 else group.suspects
             light = [_light(c) for c in group.candidates]
-            weighed.append(Weighed(light, compared, self.search.weighing))
+            weighed.append(Weighed(light, compared, self.search.prior))
         return groups
 
     def tried(
@@ -91,7 +91,7 @@ def _recorded(without: str) -> Iterator[tuple[list[Weighed], set[str]]]:
 
 
 def keep_case(case: Path, out: Path, without: str = "") -> None:
-    """Diagnose a case and keep its result, its weighings and the parts that found something.
+    """Diagnose a case and keep its result, what was weighed and the parts that found something.
 
     Parameters
     ----------

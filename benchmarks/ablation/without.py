@@ -11,26 +11,26 @@ from typing import Any
 from unittest.mock import patch
 
 from benchmarks.ablation.kept import Weighed, found_by, keep_cases, weighed_of
-from pamrs.diagnosis.evidence import weigh
+from pamrs.diagnosis.evidence import posterior
 from pamrs.effects import UNLISTED, Hypothesis
 from trial.marks import Mark, covered, family, keys_of, mark, opened, result_of
 from trial.summary import table
 
-_WEIGHING = "pamrs.diagnosis.evidence._weighing"
+_EVIDENCE = "pamrs.diagnosis.evidence"
 
-#: what is left out of the weighing: names of its module, and what stands in their place
+#: what is left out of prior and posterior: names of their modules, and what stands in their place
 WEIGHTS: dict[str, dict[str, Any]] = {
-    "more of the evidence counts near the noise": {"_tempering": lambda *_: 0.02},
-    "forms of equations err": {"_FORM_ERROR": 0.0},
-    "noise levels err": {"_LEAST_ERROR": 1e-6},
-    "a right name may be missed": {"_MISSED_ODDS": 0.0},
-    "physics without a name costs": {"_UNLISTED_PRICE": 0.0},
-    "parameters have tolerances": {"_STRAIN_SHARE": 0.0},
-    "names, parameters and places cost": {"price": lambda *_: 0.0},
-    "values have usual ranges": {"loss_by_values": lambda *_: 0.0},
-    "a time constant is seen": {"_has_unseen_time": lambda *_: False},
-    "a free clock drifts": {"_lacks_drift": lambda *_: False},
-    "an absent effect names nothing": {"is_absent": lambda *_: False},
+    "more of the evidence counts near the noise": {"_posterior._tempering": lambda *_: 0.02},
+    "forms of equations err": {"_posterior._FORM_ERROR": 0.0},
+    "noise levels err": {"_posterior._LEAST_ERROR": 1e-6},
+    "a right name may be missed": {"_posterior.MISSED_ODDS": 0.0},
+    "physics without a name costs": {"_posterior.UNLISTED_PRICE": 0.0},
+    "parameters have tolerances": {"_posterior._STRAIN_SHARE": 0.0},
+    "names, parameters and places cost": {"_prior.Prior.price": lambda *_: 0.0},
+    "values have usual ranges": {"_prior.loss_by_value": lambda *_: 0.0},
+    "a time constant is seen": {"_prior._has_unseen_time": lambda *_: False},
+    "a free clock drifts": {"_prior._lacks_drift": lambda *_: False},
+    "an absent effect names nothing": {"_posterior.is_absent": lambda *_: False},
 }
 #: parts of the search that are left out, by how their names begin
 PARTS = (
@@ -49,7 +49,7 @@ _FLOOR = 1e-3  # least probability in a log score
 
 @dataclass(frozen=True)
 class Answer:
-    """What a weighing says of a group of blocks.
+    """Posterior of a group of blocks, compared with what is concealed.
 
     Attributes
     ----------
@@ -120,9 +120,9 @@ class _Group:
     odd: bool
 
     def answer(self) -> Answer:
-        """What the weighing says now."""
+        """The posterior, compared with what is concealed."""
         own = self.weighed
-        found = weigh(own.candidates, own.suspects, own.weighing)
+        found = posterior(own.candidates, own.suspects, own.prior)
         return answer(found, self.there, self.anywhere, odd=self.odd)
 
 
@@ -152,14 +152,14 @@ def _gain(before: Sequence[float], after: Sequence[float]) -> str:
 
 
 def weights_table(trials: Iterable[Path]) -> str:
-    """Markdown: the weighing of kept cases of trials without each of its prices and priors."""
+    """Markdown: the posterior of kept cases of trials without each of its prices and priors."""
     groups = [group for folder in trials for group in _groups(folder)]
     whole = [group.answer() for group in groups]
     rows = []
     for name, instead in {"(nothing)": {}, **WEIGHTS}.items():
         with ExitStack() as left_out:
             for own, value in instead.items():
-                left_out.enter_context(patch(f"{_WEIGHING}.{own}", value))
+                left_out.enter_context(patch(f"{_EVIDENCE}.{own}", value))
             told = [group.answer() for group in groups]
         rows.append(
             (

@@ -12,7 +12,7 @@ from benchmarks.ablation import kept as keeping
 from benchmarks.ablation.__main__ import main
 from benchmarks.ablation.kept import found_by, keep_case, weighed_of
 from benchmarks.ablation.without import WEIGHTS, answer
-from pamrs.diagnosis.evidence import weigh
+from pamrs.diagnosis.evidence import posterior
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
 from tests.diagnosis.held import held
 from trial.tests.test_cases import LEAK, key_of
@@ -68,7 +68,7 @@ def test_what_is_kept_is_judged_without_each_part(
 ) -> None:
     kept = folder / "kept"
     (own,) = weighed_of(kept, "case_0001")
-    found = weigh(own.candidates, own.suspects, own.weighing)
+    found = posterior(own.candidates, own.suspects, own.prior)
     stated = json.loads((kept / "case_0001.json").read_text())["probabilities"]
     leading = max(found, key=lambda h: found[h])
     assert str(leading) == "leak_muscle"

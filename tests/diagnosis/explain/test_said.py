@@ -285,7 +285,7 @@ def test_a_wrong_value_that_is_not_determined_is_no_name_in_noise(
         base.fit, moved=base.fit.moved | {name: 5.0}, values=base.fit.values | {name: far}
     )
     monkeypatch.setattr(
-        "pamrs.diagnosis.evidence._undetermined.spread_over_pieces",
+        "pamrs.diagnosis.evidence._determined.spread_over_pieces",
         lambda problem, found: {name: std * tolerance},
     )
     wrong = replace(base, fit=moved, wrong=(name,))

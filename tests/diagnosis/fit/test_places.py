@@ -14,7 +14,7 @@ import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, weigh
+from pamrs.diagnosis.evidence import FittedHypothesis, Prior, posterior
 from pamrs.diagnosis.fit import Problem, acts_in, places_of, residuals, starts_of
 from pamrs.diagnosis.next_experiment import measurable
 from pamrs.diagnosis.noise import Excess
@@ -164,7 +164,9 @@ def made_up(term: str, left: float, places: int) -> FittedHypothesis:
 
 def weighed(*found: FittedHypothesis) -> dict[str, float]:
     chambers = [b for b in blocks_of(PAIR) if b.kind == "chamber"]
-    return by_text(weigh([made_up("", 40.0, 1), *found], chambers, Weighing(0.985, 30.0, SETTINGS)))
+    return by_text(
+        posterior([made_up("", 40.0, 1), *found], chambers, Prior(0.985, 30.0, SETTINGS))
+    )
 
 
 def test_an_effect_at_many_places_is_no_more_probable_for_it() -> None:

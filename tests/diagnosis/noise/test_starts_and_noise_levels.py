@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import t
 
 import pamrs
-from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, significant, weigh
+from pamrs.diagnosis.evidence import FittedHypothesis, Prior, posterior, significant
 from pamrs.diagnosis.fit import Problem, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import (
@@ -149,7 +149,7 @@ def named(effect: str, ratio: float, scatter: float = 0.05, **values: float) -> 
 def weighed(*given: FittedHypothesis) -> dict[str, float]:
     """Probabilities by the text of each hypothesis of the arm."""
     arm = [blocks_of(RIG, NOISE)["arm"]]
-    return by_text(weigh(given, arm, Weighing(0.985, 30.0, SETTINGS)))
+    return by_text(posterior(given, arm, Prior(0.985, 30.0, SETTINGS)))
 
 
 def test_of_a_mismatch_near_the_noise_the_noise_says_how_much_may_be_left() -> None:

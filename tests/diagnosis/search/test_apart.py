@@ -8,7 +8,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, Weighing, judge, weigh
+from pamrs.diagnosis.evidence import BlockGroup, FittedHypothesis, Prior, judge, posterior
 from pamrs.diagnosis.fit import Fit, Problem
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
@@ -25,7 +25,7 @@ SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
 CHANNELS = ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")
 BLOCKS = [b for b in available_blocks(RIG, CHANNELS) if b.kind != "arm"]
-WEIGHING = Weighing(0.985, 30.0, SETTINGS)
+PRIOR = Prior(0.985, 30.0, SETTINGS)
 PROBLEM = Problem(BLOCKS, [], core_rig(RIG), SETTINGS)
 TRIAL = Attempts(PROBLEM, PROBLEM, RIG, {}, {}, BLOCKS)
 
@@ -50,7 +50,7 @@ def candidate(key: str, supply: float, chamber: float, **values: float) -> Fitte
 def group(*found: FittedHypothesis) -> BlockGroup:
     start = candidate("", 2.5, 64.0)
     every = [start, *found]
-    probabilities = weigh(every, BLOCKS, WEIGHING)
+    probabilities = posterior(every, BLOCKS, PRIOR)
     chamber = next(b for b in BLOCKS if b.name == "chamber")
     return BlockGroup(
         BLOCKS, start.fit_excess, start.fit_excess, every, probabilities, chamber, {}, BLOCKS
@@ -67,7 +67,7 @@ def test_a_leak_of_the_tank_is_named_beside_a_chamber_without_a_name() -> None:
         candidate("valve_hysteresis", 2.4, 58.0, **{"valve_hysteresis.half_width": 0.01}),
     )
     assert whole.probabilities[UNLISTED] > 0.8
-    tank, chamber = _split_by_names(whole, TRIAL, WEIGHING)
+    tank, chamber = _split_by_names(whole, TRIAL, PRIOR)
     assert [[b.name for b in part.blocks] for part in (tank, chamber)] == [["supply"], ["chamber"]]
     judged = judge([tank, chamber], SETTINGS)
     assert [(j.verdict, j.named) for j in judged] == [
@@ -84,7 +84,7 @@ def test_a_valve_that_explains_the_tank_alone_is_no_name() -> None:
     whole = group(
         candidate("valve_hysteresis", 0.02, 60.0, **{"valve_hysteresis.half_width": 0.01})
     )
-    assert _split_by_names(whole, TRIAL, WEIGHING) == []
+    assert _split_by_names(whole, TRIAL, PRIOR) == []
 
 
 def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,7 +97,7 @@ def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) 
         return replace(candidates[0].fit, effects=terms("heat_transfer"))
 
     monkeypatch.setattr(Attempts, "fit_united", united)
-    parts = _split_by_names(group(volume, heat), TRIAL, WEIGHING)
+    parts = _split_by_names(group(volume, heat), TRIAL, PRIOR)
     assert asked == [["heat_transfer", "supply.volume"]]
     judged = judge(parts, SETTINGS)
     assert {str(t) for j in judged for t in j.added} == {"supply.volume", "heat_transfer"}

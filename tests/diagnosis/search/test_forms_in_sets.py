@@ -13,7 +13,7 @@ from typing import cast
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, significant
+from pamrs.diagnosis.evidence import FittedHypothesis, Prior, significant
 from pamrs.diagnosis.fit import fit, form_in, starts_of
 from pamrs.diagnosis.model import owners_of_effects
 from pamrs.diagnosis.screen import screen
@@ -71,7 +71,7 @@ def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(attempts: A
     both = list(terms("leak_muscle", "heat_transfer"))
     screened = screen(attempts.fit_problem, start, both, attempts.no_inflation, sealed=True)
     told: list[str] = []
-    search = Search(attempts, screened, base, Weighing(0.985, 60.0, SETTINGS), told.append)
+    search = Search(attempts, screened, base, Prior(0.985, 60.0, SETTINGS), told.append)
     found = in_best_forms(search, base)
     assert told[0] == "trying other forms of leak_muscle in leak_muscle+heat_transfer"
     assert form_in(found.fit.rig, Term("leak_muscle")) == "power"

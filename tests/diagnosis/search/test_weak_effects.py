@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import BlockLikelihood, FittedHypothesis, Weighing, share_left, weigh
+from pamrs.diagnosis.evidence import BlockLikelihood, FittedHypothesis, Prior, posterior, share_left
 from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.fit import Events
 from pamrs.diagnosis.noise import Excess
@@ -100,7 +100,7 @@ def weighed(*sets: FittedHypothesis, start: FittedHypothesis | None = None) -> d
     recordings of 30 s.
     """
     every = [start or candidate("", 10.0), *sets]
-    return by_text(weigh(every, CHAMBER, Weighing(0.985, 30.0, SETTINGS)))
+    return by_text(posterior(every, CHAMBER, Prior(0.985, 30.0, SETTINGS)))
 
 
 def test_a_set_that_explains_nothing_says_nothing_against_one_that_does() -> None:

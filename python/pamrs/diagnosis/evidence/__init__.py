@@ -1,54 +1,57 @@
 """Hypotheses, what speaks for each, and the verdict of each group of blocks.
 
-Public: `FittedHypothesis`, `BlockGroup`, `significant`, `misses_only_held_out` (hypotheses and what
-they leave); `BlockLikelihood`, `Likelihood` (how probable recordings are);
-`weigh`, `explains`, `is_absent`, `log_weight`, `LEAST_TEMPERING`, `share_left`, `same_recordings`,
-`probability_cap`, `possible_gain`, `prior_loss`, `Weighing` (their weights); `price_of_wrong`,
-`weigh_only_noise` (those where the baseline leaves only noise); `drop_undetermined`,
-`with_stated_std`, `is_outside`, `put_aside` (names that do not hold); `Judged`, `judge`,
-`case_probabilities`, `case_ambiguity`, `is_unlikely`, `parameters_at_wall` (verdicts).
+A probability is made in two files: `_prior` (odds before any data) and `_posterior` (likelihood
+times prior, for hypotheses of one group of blocks and of all groups). Public: `FittedHypothesis`,
+`BlockGroup` (hypotheses); `BlockLikelihood`, `Likelihood` (how probable recordings are); `Prior`,
+`probability_cap`, `loss_of_file`, `is_unlikely`, `parameters_at_wall` (odds); `posterior`,
+`posterior_where_noise`, `log_weight`, `possible_gain`, `drop_undetermined`, `put_aside`,
+`are_alike` (probabilities); `explains`, `share_left`, `significant`, `misses_only_held_out` (what
+hypotheses leave); `is_absent`, `same_recordings`, `value_may_be_inside`, `with_stated_std` (sizes
+that are determined); `Judged`, `judge`, `case_probabilities`, `case_ambiguity` (verdicts).
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.evidence._candidates import (
+    FORM_SHARE_ALIKE,
     BlockGroup,
     FittedHypothesis,
+    explains,
     misses_only_held_out,
+    share_left,
     significant,
 )
-from pamrs.diagnosis.evidence._likelihood import BlockLikelihood, Likelihood
-from pamrs.diagnosis.evidence._only_noise import price_of_wrong, weigh_only_noise
-from pamrs.diagnosis.evidence._undetermined import (
-    drop_undetermined,
-    is_outside,
-    put_aside,
+from pamrs.diagnosis.evidence._determined import (
+    is_absent,
+    same_recordings,
+    value_may_be_inside,
     with_stated_std,
 )
-from pamrs.diagnosis.evidence._verdicts import (
-    SHARED_ODDS,
-    WALL_TOLERANCES,
-    Judged,
-    are_alike,
-    case_ambiguity,
-    case_probabilities,
-    is_unlikely,
-    judge,
-    parameters_at_wall,
-)
-from pamrs.diagnosis.evidence._weighing import (
-    FORM_SHARE_ALIKE,
+from pamrs.diagnosis.evidence._likelihood import BlockLikelihood, Likelihood
+from pamrs.diagnosis.evidence._posterior import (
     LEAST_TEMPERING,
-    Weighing,
-    explains,
-    is_absent,
+    are_alike,
+    drop_undetermined,
     log_weight,
     possible_gain,
-    prior_loss,
+    posterior,
+    posterior_where_noise,
+    put_aside,
+)
+from pamrs.diagnosis.evidence._prior import (
+    SHARED_ODDS,
+    WALL_TOLERANCES,
+    Prior,
+    is_unlikely,
+    loss_of_file,
+    parameters_at_wall,
     probability_cap,
-    same_recordings,
-    share_left,
-    weigh,
+)
+from pamrs.diagnosis.evidence._verdicts import (
+    Judged,
+    case_ambiguity,
+    case_probabilities,
+    judge,
 )
 
 __all__ = [
@@ -61,28 +64,27 @@ __all__ = [
     "BlockGroup",
     "Judged",
     "Likelihood",
-    "Weighing",
+    "Prior",
     "are_alike",
     "case_ambiguity",
     "case_probabilities",
     "drop_undetermined",
     "misses_only_held_out",
     "explains",
-    "is_outside",
     "is_absent",
     "is_unlikely",
     "judge",
+    "loss_of_file",
     "log_weight",
     "put_aside",
     "probability_cap",
     "possible_gain",
-    "price_of_wrong",
-    "prior_loss",
     "same_recordings",
     "share_left",
     "significant",
     "with_stated_std",
     "parameters_at_wall",
-    "weigh",
-    "weigh_only_noise",
+    "value_may_be_inside",
+    "posterior",
+    "posterior_where_noise",
 ]

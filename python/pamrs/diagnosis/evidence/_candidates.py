@@ -13,6 +13,14 @@ from pamrs.diagnosis.noise import Excess, NoiseLevel
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import Hypothesis, Term
 
+# excess over noise from which a recording tests what an effect leaves (decision 14)
+_TELLING_EXCESS = 0.5
+_TELLING_SHARE = 0.9  # share of the largest excess from which recordings always are
+# share left of hardly a mismatch by what explains it: it has to take 30 % (decision 20)
+_EXPLAINED_SHARE = 0.7
+# share of a mismatch by which forms that leave as much differ (decision 20)
+FORM_SHARE_ALIKE = 0.01
+
 
 @dataclass(frozen=True, eq=False)
 class FittedHypothesis:
@@ -64,10 +72,6 @@ class FittedHypothesis:
     def hypothesis(self) -> Hypothesis:
         """Hypothesis that its effects and wrong parameters are."""
         return Hypothesis(self.terms)
-
-    def beyond_walls(self, walls: float) -> float:
-        """Sum of ``log(|moved| / walls)`` over its wrong parameters, each at least 0."""
-        return sum(self.beyond_walls_by(name, walls) for name in self.wrong)
 
     def beyond_walls_by(self, name: str, walls: float) -> float:
         """Distance of a wrong parameter beyond the walls: ``log(|moved| / walls)``, at least 0."""
@@ -151,3 +155,51 @@ def misses_only_held_out(
     """
     quiet = not any(significant(e) for e in fit_excess.values())
     return not nothing_held_out and quiet and any(significant(e) for e in held_out_excess.values())
+
+
+def share_left(
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+) -> float:
+    """Share of the baseline's excess variance that a set of effects leaves in held-out recordings.
+
+    Held-out recordings that hardly show the mismatch cannot say how much of it is left: the fitted
+    ones then do, and what an effect adds to the held-out ones, beyond what noise may, counts as
+    well. Events were found in held-out recordings as in the others: the larger share of the two
+    counts.
+    """
+    (was, now), (before, after) = _excesses(candidate, baseline, suspects)
+    if candidate.fit.events is not None and min(was, before) > _TELLING_EXCESS:
+        return max(now / was, after / before)
+    if before > min(_TELLING_EXCESS, _TELLING_SHARE * max(was, before)):
+        return after / before
+    shares = [now / was] if was > 0.0 else []
+    if after > _TELLING_EXCESS:
+        shares.append((after - _TELLING_EXCESS) / max(was, _TELLING_EXCESS))
+    return max(shares, default=1.0)
+
+
+def _excesses(
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+) -> list[tuple[float, float]]:
+    """Excess variance that the baseline and a set leave, on fitted and on held-out recordings."""
+
+    def over(excess_by_block: dict[str, Excess]) -> float:
+        return sum(max(0.0, excess_by_block[b.name].ratio - 1.0) for b in suspects)
+
+    return [
+        (over(baseline.fit_excess), over(candidate.fit_excess)),
+        (over(baseline.held_out_excess), over(candidate.held_out_excess)),
+    ]
+
+
+def explains(
+    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+) -> bool:
+    """True where a candidate leaves only noise, fitted and held out, of what was clearly more."""
+    quiet = not any(
+        significant(e[b.name])
+        for b in suspects
+        for e in (candidate.fit_excess, candidate.held_out_excess)
+    )
+    before, after = max(_excesses(candidate, baseline, suspects))
+    return quiet and after < _EXPLAINED_SHARE * before

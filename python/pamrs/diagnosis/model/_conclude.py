@@ -20,9 +20,9 @@ from pamrs.diagnosis.evidence import (
     case_ambiguity,
     case_probabilities,
     drop_undetermined,
-    is_outside,
     judge,
     put_aside,
+    value_may_be_inside,
     with_stated_std,
 )
 from pamrs.diagnosis.fit import (
@@ -277,7 +277,9 @@ def _needless(models: Models, settings: DiagnosisSettings) -> set[int]:
         k
         for k, judged in enumerate(models.judged)
         for name in judged.wrong
-        if not is_outside(models.chosen[models.owners[name]].fit, name, settings)
+        if value_may_be_inside(
+            models.chosen[models.owners[name]].fit, name, settings.most_tolerances
+        )
     }
 
 

@@ -17,16 +17,15 @@ from pamrs.diagnosis.evidence import (
     SHARED_ODDS,
     BlockGroup,
     FittedHypothesis,
-    Weighing,
+    Prior,
     are_alike,
     is_absent,
     is_unlikely,
-    price_of_wrong,
-    prior_loss,
+    loss_of_file,
+    posterior,
+    posterior_where_noise,
     share_left,
     significant,
-    weigh,
-    weigh_only_noise,
 )
 from pamrs.diagnosis.fit import Problem, Start, acts_in, concerns
 from pamrs.diagnosis.prepare import Block
@@ -183,21 +182,21 @@ def _find_hidden_by_values(
     refit: Refit, tell: Say, *, effects: bool
 ) -> dict[FittedHypothesis, float]:
     """Hypotheses of blocks whose baseline leaves only noise, but moves parameters for it, each with
-    the logarithm of what it costs: values that the file may be wrong about and, if asked for,
-    effects, which the values may have followed.
+    the log odds that it loses before any data: values that the file may be wrong about and, if
+    asked for, effects, which the values may have followed.
     """
     attempts, baseline = refit.attempts, refit.start.fit
     settings = attempts.settings
     if not effects:
         with_freed = free_suspects(attempts, baseline, baseline, tell, share=0.0)
-        return {c: price_of_wrong(c, settings) for c in with_freed}
+        return {c: loss_of_file(c, settings) for c in with_freed}
     state = screen_mismatch(refit, tell)
     singles = [*fit_singles(state.search), *fit_events(state.search, state.per_recording)]
     not_absent = [c for c in singles if not is_absent(c, settings.most_tolerances)]
     near = state.search.heaviest_first(not_absent)[: settings.most_polished]
     polished = [attempts.polish(c) if c in near else c for c in not_absent]
-    return {c: price_of_wrong(c, settings) for c in state.wrong_values} | {
-        c: prior_loss(c, state.search.weighing) for c in polished
+    return {c: loss_of_file(c, settings) for c in state.wrong_values} | {
+        c: state.search.prior.loss(c) for c in polished
     }
 
 
@@ -289,7 +288,7 @@ class Mismatch:
         if _leading(weighed) == UNLISTED:
             what = "the division of the blocks by their names"
             parts = part(
-                what, lambda: _split_by_names(group, refit.attempts, self.search.weighing), []
+                what, lambda: _split_by_names(group, refit.attempts, self.search.prior), []
             )
             if parts:
                 return parts
@@ -350,10 +349,10 @@ class OnlyNoise:
         whole = replace(refit, attempts=replace(refit.attempts, suspects=self.group.blocks))
         work = partial(_find_hidden_by_values, whole, self.tell, effects=with_effects)
         what = "the search for what moved values explain"
-        prices = refit.attempts.fit_problem.losses.part(what, work, {})
+        losses = refit.attempts.fit_problem.losses.part(what, work, {})
         # what is there once is paid for once: the odds of both places are given for both
-        prices |= dict.fromkeys(self.shared, math.log(SHARED_ODDS))
-        return [weigh_only_noise(self.group, prices)]
+        losses |= dict.fromkeys(self.shared, math.log(SHARED_ODDS))
+        return [posterior_where_noise(self.group, losses)]
 
 
 def _leading(weighed: Mapping[Hypothesis, float]) -> Hypothesis:
@@ -398,7 +397,7 @@ def _add_form(group: BlockGroup, refit: Refit, say: Say, tell: Say) -> BlockGrou
     return replace(group, closure=assessed)
 
 
-def _split_by_names(group: BlockGroup, attempts: Attempts, weighing: Weighing) -> list[BlockGroup]:
+def _split_by_names(group: BlockGroup, attempts: Attempts, prior: Prior) -> list[BlockGroup]:
     """A group in parts, where a name explains a block in which alone it acts; else nothing.
 
     A leak of the tank is seen in the tank's pressure, whatever the chamber behind the valve keeps
@@ -413,7 +412,7 @@ def _split_by_names(group: BlockGroup, attempts: Attempts, weighing: Weighing) -
 
     def weighed(blocks: list[Block]) -> dict[Hypothesis, float]:
         candidates = [c for c in acting if any(b in blocks for b in acting[c])]
-        return weigh([start, *candidates], blocks, weighing)
+        return posterior([start, *candidates], blocks, prior)
 
     alone = {
         b.name: weighed([b])

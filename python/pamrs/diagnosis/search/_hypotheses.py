@@ -11,13 +11,13 @@ from pamrs._progress import Line
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     FittedHypothesis,
-    Weighing,
+    Prior,
     explains,
     is_absent,
     possible_gain,
+    posterior,
     probability_cap,
     same_recordings,
-    weigh,
 )
 from pamrs.diagnosis.fit import Fit, Start, acts_in, fits, form_in, same_data_in, two_at_a_time
 from pamrs.diagnosis.noise import LEAST_SIZE
@@ -152,7 +152,7 @@ def screen_mismatch(refit: Refit, tell: Say) -> SearchState:
         sealed=sealed,
         strong=strong,
     )
-    weighing = Weighing(
+    prior = Prior(
         probability_cap(
             attempts.fit_problem,
             mismatch,
@@ -162,7 +162,7 @@ def screen_mismatch(refit: Refit, tell: Say) -> SearchState:
         max(p.n * p.dt for p in attempts.fit_problem.recordings),
         attempts.settings,
     )
-    search = Search(attempts, screened, start, weighing, tell)
+    search = Search(attempts, screened, start, prior, tell)
     return SearchState(search, mismatch, wrong_values, per_recording, transient)
 
 
@@ -242,7 +242,7 @@ def weigh_to_the_end(
     start, attempts, settings = candidates[0], search.attempts, search.attempts.settings
 
     def weights(sets: list[FittedHypothesis]) -> dict[Hypothesis, float]:
-        return weigh(sets, attempts.compared, search.weighing)
+        return posterior(sets, attempts.compared, search.prior)
 
     probabilities = weights(candidates)
     likely = [c for c in candidates[1:] if probability_of(probabilities, c) > _POLISH_FROM]
@@ -445,7 +445,7 @@ def _add_same_data(search: Search, singles: list[FittedHypothesis]) -> list[Fitt
         same = same_data_in(attempts.nominal, effect)
         shaped = single if same is None else _in_shape(search, single, same)
         all_shaped.append(shaped)
-        if same is not None and same_recordings(shaped, effect, search.weighing.seconds):
+        if same is not None and same_recordings(shaped, effect, search.prior.seconds):
             others += (
                 [_as_other(attempts, start, shaped, same)]
                 if wanted(Term(same.effect), shaped)

@@ -14,7 +14,7 @@ from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     LEAST_TEMPERING,
     FittedHypothesis,
-    Weighing,
+    Prior,
     log_weight,
     share_left,
     significant,
@@ -60,8 +60,8 @@ class Search:
         Signatures of the effects.
     start : FittedHypothesis
         The refitted baseline.
-    weighing : Weighing
-        What they are weighed by.
+    prior : Prior
+        Their odds before any data.
     tell : callable
         Receives progress.
     """
@@ -69,15 +69,15 @@ class Search:
     attempts: Attempts
     screened: Screen
     start: FittedHypothesis
-    weighing: Weighing
+    prior: Prior
     tell: Say
 
     def weight(self, candidate: FittedHypothesis) -> float:
         """Logarithm of what a hypothesis weighs against others."""
-        # that of `weigh` depends on the best hypothesis of all, which is not found yet: by a fixed
-        # one the order of those that are known stays as it is when others come
+        # the tempering of `posterior` depends on the best hypothesis of all, which is not found
+        # yet: by a fixed one the order of those that are known stays as it is when others come
         return log_weight(
-            candidate, self.start, self.attempts.compared, self.weighing, LEAST_TEMPERING
+            candidate, self.start, self.attempts.compared, self.prior, LEAST_TEMPERING
         )
 
     def share_left(self, candidate: FittedHypothesis) -> float:

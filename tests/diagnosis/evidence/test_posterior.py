@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import FittedHypothesis, Weighing, possible_gain, weigh
+from pamrs.diagnosis.evidence import FittedHypothesis, Prior, possible_gain, posterior
 from pamrs.diagnosis.evidence._likelihood import _Covariance
-from pamrs.diagnosis.evidence._verdicts import _with_capped_names
-from pamrs.diagnosis.evidence._weighing import loss_by_values
+from pamrs.diagnosis.evidence._posterior import _with_capped_names
+from pamrs.diagnosis.evidence._prior import loss_by_value
 from pamrs.diagnosis.fit import Events, Fit, Problem, Start, fits
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
@@ -62,7 +62,7 @@ def hypothesis(
 
 
 def weighed(*found: FittedHypothesis) -> dict[str, float]:
-    return by_text(weigh([hypothesis({}, 1.0), *found], ARM, Weighing(0.985, 30.0, SETTINGS)))
+    return by_text(posterior([hypothesis({}, 1.0), *found], ARM, Prior(0.985, 30.0, SETTINGS)))
 
 
 def test_an_effect_that_is_not_told_from_none_names_nothing() -> None:
@@ -89,7 +89,7 @@ def test_a_value_far_from_its_prior_is_rare_and_not_ruled_out() -> None:
     prior = 0.035
     for times in (0.0, 1.0, 10.0):
         found = hypothesis({"com_offset": {"angle": (times * prior, 1e-4)}}, 0.0)
-        assert loss_by_values(found) == pytest.approx(math.log1p(times**2))
+        assert loss_by_value(found, "com_offset.angle") == pytest.approx(math.log1p(times**2))
 
 
 def test_of_two_the_one_that_leaves_less() -> None:
@@ -149,7 +149,7 @@ def test_what_follows_a_curve_of_the_model_is_not_left_by_a_name() -> None:
     start = leaving_rows(hypothesis({}, 1.0), 1.0, 1.0)
     creep = leaving_rows(hypothesis(CREEP, 1.0), 1.05, 0.5)
     damping = leaving_rows(hypothesis(DAMPING, 1.0), 0.95, 1.0)
-    found = by_text(weigh([start, creep, damping], ARM, Weighing(0.985, 30.0, SETTINGS)))
+    found = by_text(posterior([start, creep, damping], ARM, Prior(0.985, 30.0, SETTINGS)))
     assert found["muscle_creep"] > 0.5 > 0.01 > found["muscle_rate_damping"]
 
 

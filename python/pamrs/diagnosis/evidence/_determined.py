@@ -1,0 +1,147 @@
+"""Sizes and wrong values that recordings determine, and those that they do not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from pamrs.diagnosis.evidence._candidates import BlockGroup, FittedHypothesis
+from pamrs.diagnosis.fit import Fit, Problem, form_in, moved_value, same_data_in, spread_over_pieces
+from pamrs.effects import Term, effect_of
+
+_SAME_SHARE = 0.1  # part of an effect's size below which what tells it from another effect is zero
+# [standard deviations] standard deviations within which a value is not told from zero
+SAME_STDS = 2.0
+# stated deviations within which a size, or that a value is wrong, is not determined; a stated one
+# is twice the pieces'
+_DETERMINED_STDS = 1.0
+
+
+def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
+    """True where a wrong value may be inside its tolerances (`walls` of them), or all sizes of an
+    effect together may be zero, within two standard deviations. A fit that goes on with such an
+    effect may end lower without the effect's doing.
+
+    Two sizes that do nearly the same may each be as uncertain as it is large, and their sum known
+    well. The shape is taken as it was fitted: that of what is not there is anything.
+    """
+    fitted = candidate.fit
+    if may_be_inside(candidate, walls, SAME_STDS):
+        return True
+    if fitted.events is not None:
+        return False
+    names = list(fitted.values)
+    for effect in candidate.effects:
+        names_of = [name for name in names if effect_of(name) == effect]
+        sizes = np.isin(names_of, fitted_sizes(fitted, effect))
+        if not sizes.any():
+            continue
+        at = [names.index(name) for name in names_of]
+        values = np.array([fitted.values[n] / fitted.scales[n] for n in names_of])[sizes]
+        spread = fitted.covariance[np.ix_(at, at)]
+        certain = np.any((values != 0.0) & (np.diag(spread)[sizes] == 0.0))
+        distance = values @ np.linalg.pinv(spread, hermitian=True)[np.ix_(sizes, sizes)] @ values
+        if not certain and is_near_none(distance, values.size, SAME_STDS):
+            return True
+    return False
+
+
+def has_undetermined_effect(candidate: FittedHypothesis) -> bool:
+    """True where all fitted sizes of an effect together are within one standard deviation of zero.
+    Effects with times of their own are left out: these times determine them.
+
+    What happened at times of its own in single recordings is told by when it happened.
+    """
+    fitted = candidate.fit
+    happened = None if fitted.events is None else fitted.events.effect
+    names = list(fitted.values)
+    for effect in (e for e in candidate.effects if e != happened):
+        sizes = fitted_sizes(fitted, effect)
+        if not sizes:
+            continue
+        at = [names.index(name) for name in sizes]
+        values, std = np.array([(fitted.values[n], fitted.std[n]) for n in sizes]).T
+        spread = fitted.covariance[np.ix_(at, at)]
+        narrow = np.sqrt(np.diag(spread))
+        if not (np.isfinite(std).all() and (narrow > 0.0).all()):
+            if not np.isfinite(std).any():
+                return True
+            continue
+        spread = spread * np.outer(std / narrow, std / narrow)
+        distance = values @ np.linalg.pinv(spread, hermitian=True) @ values
+        if is_near_none(distance, len(sizes), _DETERMINED_STDS):
+            return True
+    return False
+
+
+def fitted_sizes(fitted: Fit, effect: Term) -> list[str]:
+    """Fitted parameters of an effect that are zero where it is absent."""
+    sealed = fitted.rig.model["valve"] is None
+    form = effect.info.form(form_in(fitted.rig, effect))
+    sizes = (p for p in form.parameters if p.role_in(sealed=sealed) == "size" and p.neutral == 0.0)
+    return [name for p in sizes if (name := f"{effect}.{p.name}") in fitted.values]
+
+
+def is_near_none(distance: float, count: int, stds: float) -> bool:
+    """True where `count` sizes, at a squared distance from zero, are at least as likely to be zero
+    as one size at `stds` standard deviations.
+    """
+    return bool(chi2.sf(distance, count) >= chi2.sf(stds**2, 1))
+
+
+def may_be_inside(
+    candidate: FittedHypothesis, walls: float, stds: float = _DETERMINED_STDS
+) -> bool:
+    """True where a value called wrong is inside its tolerances or less than `stds` outside."""
+    return any(value_may_be_inside(candidate.fit, name, walls, stds) for name in candidate.wrong)
+
+
+def value_may_be_inside(
+    fitted: Fit, name: str, walls: float, stds: float = _DETERMINED_STDS
+) -> bool:
+    """True where a fitted value is inside its tolerances (`walls` of them), or less than `stds`
+    standard deviations outside.
+    """
+    wall = moved_value(fitted.known[name], math.copysign(walls, fitted.moved[name]))
+    beyond = math.copysign(1.0, fitted.moved[name]) * (fitted.values[name] - wall)
+    return beyond < stds * fitted.std.get(name, 0.0)
+
+
+def with_stated_std(
+    problem: Problem, group: BlockGroup, candidate: FittedHypothesis
+) -> FittedHypothesis:
+    """Candidate with the standard deviations that are reported: by how much pieces of the
+    recordings disagree, times ``spread_factor`` for parameters that no prior holds.
+    """
+    part, factor = replace(problem, blocks=group.blocks), problem.settings.spread_factor
+    known = candidate.fit.held_by_prior
+    std = {
+        name: spread * (1.0 if name in known else factor)
+        for name, spread in spread_over_pieces(part, candidate.fit).items()
+    }
+    return replace(candidate, fit=replace(candidate.fit, std=std))
+
+
+def same_recordings(candidate: FittedHypothesis, effect: Term, seconds: float) -> bool:
+    """True where an effect as fitted leaves the recordings that another effect would leave."""
+    same = same_data_in(candidate.fit.rig, effect)
+    if same is None:
+        return False
+    parameters: dict[str, float] = next(
+        (e["parameters"] for e in candidate.fit.rig.effects if Term.of(e) == effect), {}
+    )
+    if not parameters:
+        return False
+    telling, spread = (
+        parameters[same.without] * seconds,
+        candidate.fit.std.get(f"{effect}.{same.without}", 0.0) * seconds,
+    )
+    at_rest = abs(telling) < max(_SAME_SHARE * abs(parameters[same.size]), SAME_STDS * spread)
+    return bool(
+        parameters[same.size] > 0.0
+        and at_rest
+        and all(parameters[name] == value for name, value in same.held)
+    )
