@@ -111,11 +111,6 @@ def chains_of(rig: Rig) -> list[Chain]:
     """The chains that a person commands, in the order of the rig file; regulators only where there
     are no valves (in front of valves they hold what they are set to), and on a frame without either
     the chambers of its muscles, whose pressures the bench sets.
-
-    Parameters
-    ----------
-    rig : Rig
-        Any rig.
     """
     if rig.tables("valve"):
         lines = {qualified("line", n): ends["to"] for n, ends in rig.ports("line").items()}

@@ -51,11 +51,6 @@ class Entry(Mapping[str, Any]):
 def to_plain(value: Any) -> Any:
     """A value as JSON has it: entries by their written fields, null for what is not finite.
 
-    Parameters
-    ----------
-    value : object
-        Entries, numpy objects, containers and plain values.
-
     Raises
     ------
     TypeError

@@ -488,10 +488,6 @@ class Case(View):
         name : str, optional
             Of the case.
 
-        Returns
-        -------
-        Case
-
         Raises
         ------
         CaseError
@@ -545,10 +541,6 @@ class Case(View):
             The model to put in place.
         file : path-like, optional
             The file that it was read from, for `inputs`.
-
-        Returns
-        -------
-        Case
         """
         inputs = {name: told for name, told in self.inputs.items() if name != self._rig_file}
         if file is not None:
@@ -618,11 +610,6 @@ def _digest(path: Path) -> str:
 
 def model_and_case(file: Path) -> tuple[Rig, Path]:
     """A rig file that a diagnosis wrote, and the folder of the case from which it did.
-
-    Parameters
-    ----------
-    file : Path
-        The rig file.
 
     Raises
     ------

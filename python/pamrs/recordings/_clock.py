@@ -69,11 +69,6 @@ def is_date(cell: str) -> bool:
 def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
     """Seconds since the first of some dates or times of day.
 
-    Parameters
-    ----------
-    cells : sequence of str
-        ``22.11.2022 10:16:51,123``, ``11/22/2022 10:16:51 AM``, ``10:16:51.123``.
-
     Returns
     -------
     seconds : (n,) array
@@ -280,13 +275,6 @@ class Grid:
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
         """Values of the used rows on the grid; NaN where the mask is False.
 
-        Parameters
-        ----------
-        values : (r,) array
-            One value for each used row.
-        usable : (r,) bool array
-            Which of them may be used.
-
         Returns
         -------
         (values, mask) : (n,) arrays
@@ -417,10 +405,6 @@ def gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event
         Intervals that are no gaps but steps of the clock.
     usual : float
         The interval where none is missing [s].
-
-    Returns
-    -------
-    list of Event
     """
     holes = np.flatnonzero(~jumps & (elapsed > GAP * usual))
     away = np.minimum(elapsed[holes] / usual, _FARTHEST)

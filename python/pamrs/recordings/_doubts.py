@@ -152,19 +152,7 @@ def _as_large(one: str, two: str) -> bool:
 
 
 def unit_trouble(channel: str, unit: str) -> str:
-    """Reason for which a channel cannot be in a unit; empty where it can.
-
-    Parameters
-    ----------
-    channel : str
-        Its name, without that of a block.
-    unit : str
-        Any text.
-
-    Returns
-    -------
-    str
-    """
+    """Reason for which a channel cannot be in a unit; empty where it can."""
     troubles = []
     for si_unit in CHANNELS[channel].possible:
         try:

@@ -612,10 +612,6 @@ def load_recordings(
         What is subtracted from absolute pressures (a unit like ``bar(a)``) where no channel
         ``ambient_pressure`` was recorded [Pa]; by default that of the standard atmosphere.
 
-    Returns
-    -------
-    list of Recording
-
     Raises
     ------
     RecordingError
@@ -672,10 +668,6 @@ def completed(
         The file.
     ambient_pressure : float, optional
         What is subtracted from absolute pressures where none was recorded [Pa].
-
-    Returns
-    -------
-    Recording
     """
     channels, masks = dict(recording.channels), dict(recording.mask)
     units, count = dict(recording.units), len(recording)
@@ -730,10 +722,6 @@ def recordings_of(
         How the log is parted.
     pieces : sequence of int or str, optional
         Which parts.
-
-    Returns
-    -------
-    list of Recording
 
     Raises
     ------
@@ -822,17 +810,6 @@ class Clocks:
 
     def of(self, series: Series, clock: Clock) -> Ticks:
         """Times at which the rows of a series were taken.
-
-        Parameters
-        ----------
-        series : Series
-            Of the log.
-        clock : Clock
-            Where its times are.
-
-        Returns
-        -------
-        Ticks
 
         Raises
         ------

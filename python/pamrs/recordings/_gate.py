@@ -26,13 +26,6 @@ _DENSEST: Final = 100
 def check_size(rows: int, cells: int, source: str, columns: int = 0) -> None:
     """Refuse tables that no memory holds.
 
-    Parameters
-    ----------
-    rows, cells, columns : int
-        What there is, about.
-    source : str
-        The file, for messages.
-
     Raises
     ------
     RecordingError
@@ -242,10 +235,6 @@ class Unpacking:
             As it is in the bag; what is not packed stays as it is.
         most : int
             Bytes that it may have unpacked.
-
-        Returns
-        -------
-        bytes
 
         Raises
         ------

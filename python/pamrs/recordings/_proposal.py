@@ -629,10 +629,6 @@ class Proposal:
         rig : str
             The rig file, from there.
 
-        Returns
-        -------
-        str
-
         Raises
         ------
         RecordingError
@@ -736,10 +732,6 @@ def propose(
         For logs without any clock, the spacing of the samples [s].
     form : TextFormat, optional
         How text files are written, where that is not to be found out.
-
-    Returns
-    -------
-    Proposal
 
     Raises
     ------

@@ -219,13 +219,6 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     left it goes to `UNDECIDED`, and a wrong value loses all. A set needs no such step: the evidence
     of the set without the name decides.
 
-    Parameters
-    ----------
-    group : BlockGroup
-        Examined.
-    problem : Problem
-        Its recordings to fit.
-
     Returns
     -------
     BlockGroup

@@ -129,21 +129,7 @@ def describe(
     residuals: dict[Key, Any],
     noise_level: dict[Key, NoiseLevel],
 ) -> Picture:
-    """Shares of the excess by condition, and intervals in the worst recording.
-
-    Parameters
-    ----------
-    block : Block
-        The located block.
-    recordings : list of Prepared
-        Recordings.
-    rig : Rig
-        Nominal model, for the valve's null.
-    residuals : dict
-        Residuals of a model.
-    noise_level : dict
-        Noise levels.
-    """
+    """Shares of the excess by condition, and intervals in the worst recording."""
     columns: dict[str, list[Array]] = {}
     scaled, worst, picture = [], -1.0, Picture()
     for prepared in recordings:

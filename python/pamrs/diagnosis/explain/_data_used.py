@@ -57,10 +57,6 @@ def data_used(
         The same, compiled.
     unjudged : sequence of Unjudged
         The blocks that were not.
-
-    Returns
-    -------
-    list of RecordingUsed
     """
     needed = {name for block in blocks for name in (block.channel, *block.drives)}
     needed |= set(core.inputs)

@@ -128,11 +128,6 @@ _KINDS = ("static", "even", "odd", "time", "distance")
 def form_sentence(form: Form) -> str:
     """A form in a few sentences.
 
-    Parameters
-    ----------
-    form : Form
-        Of one block.
-
     Returns
     -------
     str

@@ -466,15 +466,6 @@ def stacked(
     """Residuals of all blocks and recordings as one vector of bin means in units of their standard
     deviation.
 
-    Parameters
-    ----------
-    problem : Problem
-        Blocks and recordings.
-    block_residuals : dict
-        Their residuals.
-    inflation : dict of str to float
-        As in :func:`fit`.
-
     Returns
     -------
     rows : (n,) array

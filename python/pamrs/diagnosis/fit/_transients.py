@@ -115,19 +115,6 @@ def fit_events(
 ) -> Fit | None:
     """Find the events of an effect in every recording and refit the baseline with them.
 
-    Parameters
-    ----------
-    effect : Term
-        A transient one.
-    problem : Problem
-        Blocks and recordings.
-    nominal : Rig
-        Nominal model.
-    baseline : Fit
-        The refitted baseline.
-    inflation : dict of str to float
-        As in :func:`pamrs.diagnosis.fit.fit`.
-
     Returns
     -------
     Fit or None

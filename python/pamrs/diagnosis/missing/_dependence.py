@@ -197,11 +197,6 @@ def _clearest(
 def with_words(missing: MissingInput) -> MissingInput:
     """Describe what a missing input depends on, and when it acts if that is at some times alone.
 
-    Parameters
-    ----------
-    missing : MissingInput
-        With its recordings, at least one.
-
     Returns
     -------
     MissingInput

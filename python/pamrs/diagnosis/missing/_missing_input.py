@@ -27,15 +27,7 @@ _MOTION = ("joint_angle", "length")
 
 
 def worst_block(problem: Problem, noise_level: Mapping[Key, NoiseLevel]) -> Block:
-    """The block that misses its recordings most, in noise levels.
-
-    Parameters
-    ----------
-    problem : Problem
-        Blocks and recordings.
-    noise_level : dict
-        By block and recording.
-    """
+    """The block that misses its recordings most, in noise levels."""
 
     def missed(block: Block) -> float:
         means = [

@@ -95,13 +95,6 @@ def checked_channels(rig: Rig, channels: tuple[str, ...]) -> tuple[str, ...]:
     """The channels that are given, or an error that names one that is unknown or not of this rig; a
     name without that of a block stands for all of its kind.
 
-    Parameters
-    ----------
-    rig : Rig
-        The rig.
-    channels : tuple of str
-        Canonical names.
-
     Raises
     ------
     ParameterError

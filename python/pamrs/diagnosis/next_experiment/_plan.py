@@ -122,10 +122,6 @@ class Plan:
         first, second : str
             Their ids, with places where the plan has them; one id with two places asks whether the
             places can be told apart.
-
-        Returns
-        -------
-        bool
         """
         both = {self.limit(first).effect, self.limit(second).effect}
         return both <= set(self.seen) and not any({a, b} == both for a, b, _ in self.pairs)

@@ -700,10 +700,6 @@ def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
         The nominal model.
     channels : tuple of str
         What every recording has, by the names of the core.
-
-    Returns
-    -------
-    list of Block
     """
     return [block for block in _all_blocks(rig, channels) if isinstance(block, Block)]
 

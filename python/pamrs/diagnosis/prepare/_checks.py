@@ -414,17 +414,6 @@ class Ready:
 def readied(case: Case, settings: DiagnosisSettings) -> Ready:
     """Ask all of :data:`CHECKS` of a case that need no prepared recordings.
 
-    Parameters
-    ----------
-    case : Case
-        The case as it was read.
-    settings : DiagnosisSettings
-        Numbers that say what is implausible.
-
-    Returns
-    -------
-    Ready
-
     Raises
     ------
     DiagnosisError
@@ -492,15 +481,6 @@ def _not_of_rig(case: str, findings: Sequence[str]) -> str:
 def implausible(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> list[str]:
     """Everything about a recording that cannot be of a rig, in words, before it is prepared.
 
-    Parameters
-    ----------
-    recording : Recording
-        SI values with masks.
-    rig : Rig
-        The nominal model.
-    settings : DiagnosisSettings
-        What is allowed.
-
     Returns
     -------
     list of str
@@ -539,15 +519,6 @@ def check_sense(
 
 def questions(proposed: LogProposal, rig: Rig, settings: DiagnosisSettings) -> list[str]:
     """Questions about a proposed log that a diagnosis would refuse, before it becomes a case.
-
-    Parameters
-    ----------
-    proposed : LogProposal
-        Of one log.
-    rig : Rig
-        The nominal model.
-    settings : DiagnosisSettings
-        Limits of what a recording can be.
 
     Returns
     -------
@@ -668,11 +639,6 @@ _FEW: Final = 8  # parts that are named
 def noted_units(case: Case) -> list[str]:
     """Sentences on what the files of a case do not say: units that were assumed, ambient pressures
     that were subtracted, parts that no recording takes.
-
-    Parameters
-    ----------
-    case : Case
-        Its recordings.
 
     Returns
     -------
@@ -841,11 +807,6 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
     A sensor ends where it ends: the end that one recording shows, by staying there for long, is
     that of all of them, and a sample there may be of anything beyond. Samples beside one are those
     of which the noise let through the lower half, and go with it.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        Those of a case.
 
     Returns
     -------

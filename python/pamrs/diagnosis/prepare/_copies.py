@@ -62,11 +62,6 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
     it does not share, some time away from what it does; none where they are short. Of two
     recordings of the same role the second is left out where most of it is a copy.
 
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        All of a case.
-
     Returns
     -------
     kept : list of Recording

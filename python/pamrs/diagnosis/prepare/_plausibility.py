@@ -90,15 +90,6 @@ def without_impossible(
 
     A recording that is beyond it for long is left out before.
 
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        SI values with masks.
-    rig : Rig
-        The nominal model.
-    settings : DiagnosisSettings
-        What is allowed.
-
     Returns
     -------
     recordings : list of Recording
@@ -597,13 +588,6 @@ def without_dead_commands(
 
     The channel is left out, where what moves can be judged by its gauges alone; a recording with
     such a command beside others without one is left out instead, so that these keep their valve.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        SI values with masks.
-    rig : Rig
-        The nominal model.
 
     Returns
     -------

@@ -581,13 +581,6 @@ def _begins_at(gauge: str) -> str:
 def tanks_without_gauge(rig: Rig, channels: Sequence[str]) -> list[str]:
     """Channels of tanks that nobody measured and whose pressure can be simulated, since what they
     feed and what is commanded there is recorded.
-
-    Parameters
-    ----------
-    rig : Rig
-        The nominal model.
-    channels : sequence of str
-        What every recording has.
     """
     tanks = [name for name, table in rig.tables("supply").items() if table["kind"] == "tank"]
     gauges = [dotted("supply_pressure", name) for name in tanks]
@@ -692,13 +685,6 @@ def varying(rig: Rig, core: _core.Rig) -> set[str]:
 def with_declared_values(rig: Rig, recordings: Sequence[Recording]) -> list[Recording]:
     """Recordings with the values that the rig file leaves to each of them, where they do not say
     them, all under the names that the core has.
-
-    Parameters
-    ----------
-    rig : Rig
-        The nominal model.
-    recordings : sequence of Recording
-        As they were read.
     """
     nominal = {name: _nominal(rig, name) for name in rig.own}
     nominal_values = {
@@ -854,15 +840,6 @@ _BETTER = 0.5  # share of what is missed there that is left with a push, where t
 
 def notes_on_slack(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
     """Sentences on models that lag where muscles are slack, and would follow if these pushed.
-
-    Parameters
-    ----------
-    rig : Rig
-        The model.
-    blocks : sequence of Block
-        Those that it misses.
-    recordings : sequence of Prepared
-        The recordings.
 
     Returns
     -------

@@ -493,15 +493,6 @@ def _bridged(values: Array, mask: Mask) -> Array:
 def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prepared:
     """Smooth the drive signals of a recording and estimate its noise.
 
-    Parameters
-    ----------
-    recording : Recording
-        As loaded.
-    rig : Rig
-        Nominal model.
-    settings : DiagnosisSettings
-        How it is made ready.
-
     Raises
     ------
     DiagnosisError

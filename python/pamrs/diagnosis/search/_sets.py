@@ -116,10 +116,6 @@ def combine(
         Single effects and values that are wrong, fitted by themselves.
     transient : list of Term
         Effects that happen at times of their own.
-
-    Returns
-    -------
-    list of FittedHypothesis
     """
     roots = search.heaviest_first(c for c in (*singles, *wrong_values) if c.fit.events is None)
     growing = _Growing(search, roots)

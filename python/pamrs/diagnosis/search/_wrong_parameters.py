@@ -64,13 +64,6 @@ def suspected_values(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
     """Parameters that moved, alone, and in pairs that one mistake makes wrong together: of several
     that moved a little one may be far off.
 
-    Parameters
-    ----------
-    fitted : Fit
-        The refitted baseline.
-    blocks : list of Block
-        Blocks that were fitted.
-
     Returns
     -------
     list of tuple of str
@@ -160,13 +153,6 @@ def free_suspects(
 def far_parameters(attempts: Attempts, fitted: Fit) -> list[str]:
     """Parameters that a fit with effects moved far, and whose freeing promises most by the linear
     model; the most promising first.
-
-    Parameters
-    ----------
-    attempts : Attempts
-        Recordings, model, noise levels.
-    fitted : Fit
-        A fit with effects.
     """
     far: list[tuple[str, ...]] = [
         (name,) for name, moved in fitted.moved.items() if abs(moved) >= _FAR_TOLERANCES

@@ -147,13 +147,6 @@ _MOST_COLUMNS: Final = 256
 def read_hdf(path: Path, form: TextFormat) -> Log:
     """Read an HDF5 file.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    form : TextFormat
-        Its `columns` name the columns of matrices.
-
     Returns
     -------
     Log
@@ -191,11 +184,6 @@ def _elsewhere(item: Any) -> str:
     """Reason for which a data set is not read: another file, or other data sets that may lead to
     one, hold its numbers.
 
-    Parameters
-    ----------
-    item : h5py.Dataset
-        The data set.
-
     Returns
     -------
     str
@@ -222,11 +210,6 @@ def _leads_elsewhere(group: Any) -> Iterator[tuple[str, str]]:
 
 def members(group: Any) -> Iterator[tuple[str, Any]]:
     """Iterate over everything in a group and below it, once each, in the order of the names.
-
-    Parameters
-    ----------
-    group : h5py.Group
-        Of a file that is open.
 
     Yields
     ------
@@ -293,13 +276,6 @@ _DEEPEST = 12  # structs in structs
 
 def read_matlab(path: Path, form: TextFormat) -> Log:
     """Read a ``.mat`` file, of version 4 to 7 or 7.3.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    form : TextFormat
-        Its `columns` name the columns of matrices.
 
     Returns
     -------

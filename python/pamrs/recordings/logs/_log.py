@@ -153,10 +153,6 @@ def same_unit(first: str, second: str) -> bool:
     first, second : str
         ``"sec"`` and ``"s"``, or ``"bar abs"`` and ``"bar"``: what a pressure is measured from may
         be said by one of them alone.
-
-    Returns
-    -------
-    bool
     """
     known = [understood_unit(text) for text in (first, second)]
     one, other = (parse_unit(each.unit) if each else None for each in known)
@@ -207,11 +203,6 @@ _ELECTRIC: Final = tuple(parse_unit(unit).dimension for unit in ("A", "V"))
 def split_heading(heading: str) -> tuple[str, str]:
     """Name and unit of a heading: ``p1 [bar]``, ``p1 (bar)``, ``p1_{bar}``, ``p1/bar``, ``p1 in
     bar``, ``p1_bar``, ``p1 bar``, ``p1 [bar] abs``, ``p1_bar_filt``.
-
-    Parameters
-    ----------
-    heading : str
-        As it stands in the file.
 
     Returns
     -------
@@ -367,10 +358,6 @@ class Log:
             The whole path, or its end: ``p1`` for ``rig/p1``; or as the heading stands in the file,
             with its unit or what an earlier version left of that: ``p1_(bar)``, ``p1_``.
 
-        Returns
-        -------
-        Series
-
         Raises
         ------
         RecordingError
@@ -425,17 +412,7 @@ def switched(series: Series) -> Series:
 
 
 def table_of(log: Log) -> Table:
-    """The series of a log that are as long as most, with their units in the headings.
-
-    Parameters
-    ----------
-    log : Log
-        Any.
-
-    Returns
-    -------
-    Table
-    """
+    """The series of a log that are as long as most, with their units in the headings."""
     counts = [len(series.values) for series in log.series.values()]
     usual = max(set(counts), key=counts.count)
     header: list[str] = []
@@ -473,10 +450,6 @@ def collected(
         What is no series, and why.
     remarks : sequence of str
         What was done as it was read.
-
-    Returns
-    -------
-    Log
 
     Raises
     ------

@@ -29,13 +29,6 @@ _SILENCE = threading.Lock()
 def read_mdf(path: Path, form: TextFormat) -> Log:
     """Read an ASAM measurement file (``.mf4``, ``.mdf``, ``.dat`` of that kind).
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    form : TextFormat
-        Not used.
-
     Returns
     -------
     Log
@@ -97,13 +90,6 @@ def _opened(path: Path) -> Any:
 
 def read_tdms(path: Path, form: TextFormat) -> Log:
     """Read a TDMS file of LabVIEW.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    form : TextFormat
-        Not used.
 
     Returns
     -------
@@ -174,13 +160,6 @@ Times = NDArray[np.int64]
 
 def read_bag(path: Path, form: TextFormat) -> Log:
     """Read a bag of ROS 2 (its folder, or its ``.db3``) or of ROS 1 (``.bag``).
-
-    Parameters
-    ----------
-    path : Path
-        The folder or file.
-    form : TextFormat
-        Not used.
 
     Returns
     -------
@@ -257,13 +236,6 @@ def _check_names(path: Path) -> None:
 
 def read_mcap(path: Path, form: TextFormat) -> Log:
     """Read an MCAP file with messages of ROS 2, of Protobuf, or in JSON.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    form : TextFormat
-        Not used.
 
     Returns
     -------
