@@ -181,8 +181,8 @@ def _quiet() -> dict[str, str]:
     return {**os.environ, "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
 
 
-def _campaign(case: _Case) -> list[float]:
-    """The arm that chooses its runs; how long each was [s]."""
+def _campaign(case: _Case) -> None:
+    """The arm that chooses its runs."""
     home, log = case.work / "campaign", case.work / "campaign.log"
     free, rig = case.case / f"{FREE}.csv", case.work / "rig.toml"
     told = (case.case / "rig.toml").read_text(encoding="utf-8")
@@ -212,15 +212,18 @@ def _campaign(case: _Case) -> list[float]:
     for count in range(RUNS + 1):  # of a call that failed there is none
         if not case.result("campaign", count).is_file():
             case.keep("campaign", count, case.work / "none", 0.0)
-    if not state.is_file():
-        return []
-    steps = json.loads(state.read_text(encoding="utf-8"))["steps"]
-    return [float(step["seconds"]) for step in steps if step["changed"] is not None]
 
 
-def _other(case: _Case, arm: str, lengths: Sequence[float]) -> None:
-    """An arm whose runs do not depend on what was found."""
-    home = case.work / arm
+def _lengths(case: _Case) -> list[float]:
+    """How long each run of the arm that chooses was [s]."""
+    state = case.work / "campaign" / "campaign.json"
+    told = json.loads(state.read_text(encoding="utf-8")) if state.is_file() else {"steps": []}
+    return [float(step["seconds"]) for step in told["steps"] if step["changed"] is not None]
+
+
+def _other(case: _Case, arm: str) -> None:
+    """An arm whose runs do not depend on what was found, as long as those that were chosen."""
+    home, lengths = case.work / arm, _lengths(case)
     names, total = [FREE], 0.0
     home.mkdir(exist_ok=True)
     for own in ("rig.toml", f"{FREE}.csv"):
@@ -244,19 +247,21 @@ def _other(case: _Case, arm: str, lengths: Sequence[float]) -> None:
         case.keep(arm, count, found, total)
 
 
-def run_case(given: tuple[Path, Spec]) -> str:
-    """All arms of one case, as far as they are not there."""
-    case = _Case(*given)
-    lengths = _campaign(case)
-    for arm in ARMS[1:]:
-        _other(case, arm, lengths)
-    return case.spec.name
+def run_arm(given: tuple[Path, Spec, str]) -> str:
+    """One arm of one case, as far as it is not there."""
+    out, spec, arm = given
+    case = _Case(out, spec)
+    if arm == ARMS[0]:
+        _campaign(case)
+    else:
+        _other(case, arm)
+    return f"{spec.name}, {arm}"
 
 
 def trial_of_campaigns(
     out: Path, wanted: Sequence[Spec], jobs: int, say: Callable[[str], None]
 ) -> None:
-    """Write keys, digests and free logs, then run every case; what is there is kept."""
+    """Write keys, digests and free logs, then run every case, arm by arm; what is there is kept."""
     manifest = out / MANIFEST
     digests: dict[str, str] = {}
     if manifest.is_file():
@@ -272,14 +277,11 @@ def trial_of_campaigns(
         write(out / "keys" / f"{spec.name}.json", made.key)
         store(made, out / "cases")
         say(f"{spec.name}: concealed")
-    work = [(out, spec) for spec in wanted]
-    if jobs > 1:
+    for arm in ARMS:  # the others are as long as the first
+        work = [(out, spec, arm) for spec in wanted]
         with multiprocessing.get_context("spawn").Pool(min(jobs, len(work))) as pool:
-            for name in pool.imap_unordered(run_case, work):
+            for name in pool.imap_unordered(run_arm, work):
                 say(f"{name}: done")
-    else:
-        for one in work:
-            say(f"{run_case(one)}: done")
 
 
 def is_right(key: dict[str, Any], result: dict[str, Any]) -> bool:
