@@ -80,11 +80,12 @@ def asks(rig, pool, name, **changes):
     return NextExperiment(f"Play {name}.", protocol=protocol_of(pool[name]), **changes)
 
 
-def log(rig, tmp_path, pool):
-    """A first recording."""
+def log(rig, tmp_path, pool, parts=1):
+    """A first recording; of several parts of it the first."""
     run = pool["step_and_shut"].simulate(rig)
+    few = slice(run.time.size // parts)
     heads = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
-    table = {"time": run.time} | {name: run[name] for name in heads}
+    table = {"time": run.time[few]} | {name: run[name][few] for name in heads}
     return pamrs.Case.from_arrays(rig, {"free": table}).recordings
 
 
@@ -103,7 +104,7 @@ def test_a_run_is_foretold_played_scored_and_kept(rig, pool, diagnosed, tmp_path
     found = campaign(
         Watched(rig),
         rig,
-        log(rig, tmp_path, pool),
+        log(rig, tmp_path, pool, parts=8),  # more than that would show the payload already
         out=out,
         budget=LIMITS,
         bench=FAST,
@@ -127,7 +128,8 @@ def test_a_run_is_foretold_played_scored_and_kept(rig, pool, diagnosed, tmp_path
         assert "Known now" in text
         assert "<svg" in text
     # the same call again finds nothing more to do
-    again = campaign(SimulatedBench(rig), rig, log(rig, tmp_path, pool), out=out, bench=FAST)
+    before = log(rig, tmp_path, pool, parts=8)
+    again = campaign(SimulatedBench(rig), rig, before, out=out, bench=FAST)
     assert (again.why, len(again.steps)) == ("decided", 1)
 
 
@@ -233,6 +235,12 @@ def test_where_no_allowed_experiment_parts_the_rivals_it_says_so(
     # only what a device can play alone was compared
     assert "multisine" in compared[0]
     assert not {"other_payload", "free_decay", "holds_both_sides"} & set(compared[0])
+    # where what is open has no model either, its block is asked about all the same
+    nameless = Found(rig, ask=ask)
+    nameless.verdict, nameless.ambiguity = "parameters", [["parameters"], ["unlisted"]]
+    diagnosed.answers[:] = [nameless]
+    goes_on = campaign(None, *given, out=tmp_path / "nameless", bench=FAST, budget=LIMITS)
+    assert (goes_on.why, goes_on.steps[0].name) == ("no recording", "fast_triangle")
 
 
 @pytest.mark.parametrize(

@@ -21,11 +21,11 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1109,
-    "campaigns": 1160,
+    "campaigns": 1150,
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11139,
+    "diagnosis": 11163,
     "effects": 404,
     "experiments": 1052,
     "findings": 947,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27731,
+    "tests": 27742,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1233,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37390
+MOST = 37404
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._budget import Budget, Cost, cost_of
 from pamrs.channels import channel_of
 from pamrs.diagnosis import Diagnosis, DiagnosisSettings
-from pamrs.diagnosis.next_experiment import Plan, measurable, plan_diagnosis, propose
+from pamrs.diagnosis.next_experiment import LEAST_BITS, Plan, measurable, plan_diagnosis, propose
 from pamrs.effects import NONE, UNLISTED
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.experiments import Experiment, experiments_of, library
@@ -24,7 +24,6 @@ from pamrs.recordings import Recording
 from pamrs.report.text import hypothesis_label, listed, spoken_name
 from pamrs.rig import Rig
 
-_LEAST_BITS: Final = 0.05  # [bit] below which an experiment parts nothing
 _LEAST_NOISES: Final = 1.0  # [noise levels] below which a pair is not told apart
 _LEVELS: Final = 0.1  # share by which numbers of an experiment may differ and be the same
 _BY_HAND: Final = 1.0  # [s] of effort beyond its length from which an experiment takes hands
@@ -201,17 +200,15 @@ def proposed(
 ) -> ProposedRun | None:
     """The experiment that tells most of what is open; None where no allowed one parts it.
 
-    With `repeat` only those that were played before are asked.
+    With `repeat` one that was played before is asked again, to see what chance leaves.
     """
     own = NextExperiment() if diagnosis is None else diagnosis.next_experiment
     rivals = list(own.hypotheses)
     allowed = pool.again if repeat else pool.new
-    if diagnosis is not None and not diagnosis.answer.settled and len(rivals) > 1:
+    if diagnosis is not None and not (repeat or diagnosis.answer.settled) and len(rivals) > 1:
         found = _parting(rig, own, allowed, recordings, settings)
-        if found is not None:
-            return replace(found, repeats=repeat)
-        if repeat or not _is_nameless(diagnosis):
-            return None
+        if found is not None or not _is_nameless(diagnosis):
+            return found
     if not any(label == str(NONE) for label, _, _ in rivals):
         rivals.append((str(NONE), rig, 0.0 if rivals else 1.0))  # what the rig file says
     if own.protocol is not None and own.protocol.name in allowed:
@@ -228,8 +225,11 @@ def proposed(
 
 
 def _is_nameless(diagnosis: Diagnosis) -> bool:
-    """True where something is missing that has no name, or that no model with one explains."""
-    return diagnosis.verdict == UNLISTED.rest or diagnosis.answer.why == "missed"
+    """True where something without a name is missing or not ruled out, or no model with a name
+    explains what is missed.
+    """
+    open_ones = [diagnosis.verdict, *(name for own in diagnosis.ambiguity for name in own)]
+    return UNLISTED.rest in open_ones or diagnosis.answer.why == "missed"
 
 
 def _parting(
@@ -256,7 +256,7 @@ def _parting(
         except DiagnosisError:  # none of them can be simulated with every rival
             return None
     bits = found.expected_information_bits or 0.0
-    if found.protocol is None or found.curves is None or bits < _LEAST_BITS:
+    if found.protocol is None or found.curves is None or bits < LEAST_BITS:
         return None
     compared = [rival for rival in own.hypotheses if rival[0] in found.curves.predicted]
     return ProposedRun(allowed[found.protocol.name], found.text, False, compared, bits)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,6 @@ from pamrs.campaigns._bench import Bench, Commands
 from pamrs.campaigns._budget import Budget, Cost
 from pamrs.campaigns._choice import (
     Pool,
-    ProposedRun,
     asked_for,
     is_healthy,
     is_open,
@@ -297,7 +296,9 @@ class _Work:
         stuck = len(last) == _UNCHANGED and not any(step.changed for step in last)
         proposal = None
         if not (stuck and any(step.repeats for step in last)):
-            proposal = self.proposal(pool, wanted, recordings, repeat=stuck)
+            proposal = proposed(
+                self.rig, self.found, pool, wanted, recordings, self.settings, repeat=stuck
+            )
         if proposal is not None:
             cost = pool.costs[proposal.experiment.name]
             step = self.folder.propose(proposal, cost, self.commands, told(self.found))
@@ -312,24 +313,6 @@ class _Work:
             return self.end("budget", f"What is left of the budget is too little ({short[0]})")
         text = f"No allowed experiment parts what is left: {what}. {helps}"
         return self.end("nothing parts", text)
-
-    def proposal(
-        self,
-        pool: Pool,
-        wanted: Mapping[str, list[str]],
-        recordings: Sequence[Recording],
-        *,
-        repeat: bool,
-    ) -> ProposedRun | None:
-        """The experiment that tells most; one that was played before where no new one tells."""
-        for again in (True,) if repeat else (False, True):
-            found = proposed(
-                self.rig, self.found, pool, wanted, recordings, self.settings, repeat=again
-            )
-            settled = self.found is not None and self.found.answer.settled
-            if found is not None or settled:
-                return found
-        return None
 
     def waiting(self, step: Step) -> Path:
         """The file that a person puts the recording of a step into."""

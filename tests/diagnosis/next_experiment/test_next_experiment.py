@@ -134,6 +134,11 @@ def test_rivals_are_told_apart_as_predicted(pair: str) -> None:
     # the bound that is stated is one
     assert float(np.mean(bits)) > outcome.bits - 0.02
     assert outcome.bits == pytest.approx(proposed.expected_information_bits, abs=1e-3)
+    # a recording that shows as much leaves nothing to be expected of the same again
+    same = propose(rig, hypotheses, noise, [played], channels=channels, experiments=[chosen])
+    assert same.expected_information_bits == 0.0
+    assert "better than the recordings that there are" in same.text
+    assert replace(outcome, shown=outcome.distance / 3.0).bits == outcome.bits
 
 
 def test_a_regulator_is_set_no_higher_than_is_known_to_be_allowed(tmp_path) -> None:

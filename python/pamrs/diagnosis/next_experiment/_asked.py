@@ -12,7 +12,13 @@ import numpy as np
 from pamrs.channels import block_of
 from pamrs.diagnosis.evidence import Judged
 from pamrs.diagnosis.fit import Problem, concerns, without_term
-from pamrs.diagnosis.next_experiment._choice import Modelled, apart, outcome_of, propose
+from pamrs.diagnosis.next_experiment._choice import (
+    LEAST_BITS,
+    Modelled,
+    apart,
+    outcome_of,
+    propose,
+)
 from pamrs.diagnosis.next_experiment._differences import noise_of
 from pamrs.diagnosis.next_experiment._words import words
 from pamrs.diagnosis.prepare import Block, Prepared
@@ -246,13 +252,18 @@ def next_to_record(
                 settings=fit_problem.settings,
                 losses=fit_problem.losses,
             )
-    if simulated is not None and not simulated.excitation:
-        simulated = None  # of what is open one has a model
-    known = simulated.pairs if simulated is not None else []
-    pairs = _pairs(asked, ambiguity, hypotheses, known)
+    pairs = _pairs(asked, ambiguity, hypotheses, simulated.pairs if simulated is not None else [])
+    if simulated is not None and not (simulated.excitation and _parts(simulated, ambiguity)):
+        simulated = None  # of what is open one has a model, or what has none is the question
     if simulated is None:
         simulated = NextExperiment(same) if same else _without_models(asked, diagnosis)
     return replace(simulated, pairs=pairs, hypotheses=list(hypotheses), noise=asked.noise)
+
+
+def _parts(simulated: NextExperiment, ambiguity: list[Hypothesis]) -> bool:
+    """True where an experiment parts hypotheses, or all that are open have a model."""
+    bits = simulated.expected_information_bits or 0.0
+    return bits >= LEAST_BITS or UNLISTED not in ambiguity
 
 
 def _first_asked(answer: Answer) -> Part | None:

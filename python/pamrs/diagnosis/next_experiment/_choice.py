@@ -9,6 +9,7 @@ distances of all pairs say how much of the present uncertainty the experiment re
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -38,7 +39,7 @@ from pamrs.diagnosis.next_experiment._differences import (
     taken,
 )
 from pamrs.diagnosis.noise import bins_of
-from pamrs.diagnosis.prepare import Prepared
+from pamrs.diagnosis.prepare import Prepared, prepare
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import Term
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -55,8 +56,12 @@ _MOST_HYPOTHESES = 6
 _SETTLED_ENTROPY = 0.01  # [bit] uncertainty below which no experiment can add to the answer
 # [bit] difference of information that counts; below it the cheaper experiment is better
 _RESOLUTION = 0.02
+LEAST_BITS = 0.05  # [bit] expected information below which an experiment parts nothing
 _MOST_SHOWN = 5  # experiments in the ranking
 _HOPELESS_SHARE = 0.1  # share of the uncertainty below which the text suggests another sensor
+# ratio of distances to the best recording that there is, below which an experiment adds nothing: a
+# pair that such a recording leaves open is not decided by another one that shows as much
+_MORE = 1.5
 
 
 Modelled = tuple[str, Rig, float]
@@ -106,8 +111,8 @@ class Outcome:
         Which one.
     sensor : str
         Channel that must be measured besides those there are; empty for none.
-    bits : float
-        Expected information about the model [bit].
+    probabilities : sequence of float
+        Of the hypotheses.
     runs : list of Simulation
         One for each hypothesis.
     left : dict of (int, int) to ResidualDifference
@@ -122,11 +127,13 @@ class Outcome:
         Noise and error of the leading model, in the bins of the experiment.
     effort : float
         What it costs, a sensor included, as time [s].
+    shown : (h, h) array
+        Squared distance of each pair in the recording that shows most of it by now.
     """
 
     experiment: Experiment
     sensor: str
-    bits: float
+    probabilities: Sequence[float]
     runs: list[Simulation]
     left: dict[tuple[int, int], ResidualDifference]
     distance: Array
@@ -134,16 +141,24 @@ class Outcome:
     models: list[Linear]
     errors: Errors
     effort: float
+    shown: Array
+
+    @property
+    def bits(self) -> float:
+        """Expected information about the model, by pairs that it shows clearly better than the
+        recordings that there are [bit].
+        """
+        better = self.distance >= _MORE**2 * self.shown
+        return information(self.probabilities, np.where(better, self.distance, 0.0))
 
     @property
     def problem(self) -> Problem:
         """Blocks, and the recording of the leading hypothesis."""
         return self.problems[0]
 
-    def exactly(self, pairs: Sequence[tuple[int, int]], probabilities: Sequence[float]) -> Outcome:
+    def exactly(self, pairs: Sequence[tuple[int, int]]) -> Outcome:
         """Outcome in which what j leaves of the outcome of i is computed anew, with the
-        sensitivities that j has there, for some pairs (i, j) of hypotheses with these
-        probabilities.
+        sensitivities that j has there, for some pairs (i, j) of hypotheses.
         """
 
         def missed(pair: tuple[int, int]) -> ResidualDifference:
@@ -155,8 +170,7 @@ class Outcome:
         distance = self.distance.copy()
         for pair in pairs:
             distance[pair] = left[pair].total
-        bits = information(probabilities, distance)
-        return replace(self, left=left, distance=distance, bits=bits)
+        return replace(self, left=left, distance=distance)
 
 
 def _telling(problem: Problem, rigs: Sequence[Rig]) -> Problem:
@@ -178,7 +192,7 @@ def outcome_of(
     settings: DiagnosisSettings,
     sensor: str = "",
     runs: Sequence[Simulation] | None = None,
-    ranking: bool = False,
+    shown: Array | None = None,
 ) -> Outcome:
     """Simulate an experiment with every hypothesis, and compare every pair.
 
@@ -201,8 +215,8 @@ def outcome_of(
         One more.
     runs : sequence of Simulation, optional
         The experiment with every hypothesis, where it was simulated before.
-    ranking : bool
-        Whether it is only ranked among others.
+    shown : (h, h) array, optional
+        Squared distances in the recordings that there are, where it is ranked among others.
 
     Raises
     ------
@@ -235,37 +249,47 @@ def outcome_of(
         return difference(problems[i], own[i].found, elsewhere(problems[i], own[j]), errors)
 
     pairs = list(itertools.permutations(range(len(rigs)), 2))
-    left = dict(zip(pairs, two_at_a_time(missed, pairs), strict=True)) if ranking else {}
+    left = {} if shown is None else dict(zip(pairs, two_at_a_time(missed, pairs), strict=True))
     distance = np.zeros((len(rigs), len(rigs)))
     for pair, found in left.items():
         distance[pair] = found.total
-    probabilities = [p for _, _, p in hypotheses]
-    bits = information(probabilities, distance)
     effort = experiment.effort + (settings.sensor_effort if sensor else 0.0)
+    chances, known = [p for _, _, p in hypotheses], 0.0 * distance if shown is None else shown
     outcome = Outcome(
-        experiment, sensor, bits, list(runs), left, distance, problems, own, errors, effort
+        *(experiment, sensor, chances, list(runs), left, distance),
+        *(problems, own, errors, effort, known),
     )
-    return outcome if ranking else outcome.exactly(pairs, probabilities)
+    return outcome if shown is not None else outcome.exactly(pairs)
 
 
-def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float]) -> list[Outcome]:
-    """Outcomes by their information, the largest first; of those with the same, the cheapest. An
-    experiment that needs what the rig file does not list comes last.
+def shown_by(
+    recordings: Sequence[Prepared],
+    hypotheses: Sequence[Modelled],
+    channels: tuple[str, ...],
+    settings: DiagnosisSettings,
+) -> Array:
+    """Squared distance (h, h) that hypothesis j keeps from the readings of hypothesis i in the
+    recording that shows most of it; zero where none can be predicted by all.
+    """
+    rigs = [rig for _, rig, _ in hypotheses]
+    shown = np.zeros((len(rigs), len(rigs)))
+    for prepared in recordings:
+        with contextlib.suppress(DiagnosisError, SimulationError):
+            problem = _telling(problem_of(rigs[0], [prepared], channels, settings), rigs)
+            models = two_at_a_time(partial(linear, problem), rigs)
+            errors = errors_of(problem, models[0])
+            for i, j in itertools.permutations(range(len(rigs)), 2):
+                found = difference(problem, models[i].found, models[j], errors).total
+                shown[i, j] = max(shown[i, j], found)
+    return shown
 
-    Parameters
-    ----------
-    outcomes : sequence of Outcome
-        Of the same hypotheses.
-    probabilities : sequence of float
-        Of these hypotheses, which may have changed since.
+
+def ranked(outcomes: Sequence[Outcome]) -> list[Outcome]:
+    """Outcomes of the same hypotheses by their information, the largest first; of those with the
+    same, the cheapest. An experiment that needs what the rig file does not list comes last.
     """
     return sorted(
-        outcomes,
-        key=lambda o: (
-            bool(o.experiment.needs),
-            -round(information(probabilities, o.distance) / _RESOLUTION),
-            o.effort,
-        ),
+        outcomes, key=lambda o: (bool(o.experiment.needs), -round(o.bits / _RESOLUTION), o.effort)
     )
 
 
@@ -342,6 +366,8 @@ def propose(
         text = "One hypothesis is left; no experiment can add to that."
         return NextExperiment(text, {}, 0.0)
     pool = experiments_of(nominal, records, settings) if experiments is None else experiments
+    ready = [r if isinstance(r, Prepared) else prepare(r, nominal, settings) for r in recordings]
+    shown = shown_by(ready, chosen, own, settings)
     found: list[Outcome] = []
     known: dict[Experiment, list[Simulation] | None] = {}
 
@@ -353,7 +379,7 @@ def propose(
         if runs is None:
             return None
         try:
-            return outcome_of(experiment, chosen, sound, own, settings, sensor, runs, ranking=True)
+            return outcome_of(experiment, chosen, sound, own, settings, sensor, runs, shown)
         except (SimulationError, DiagnosisError):
             return None  # it cannot be run there, or nothing is measured on both sides of a block
 
@@ -371,10 +397,9 @@ def propose(
             f"{', '.join(label for label, _, _ in chosen)} and measured by "
             f"{', '.join(own) or 'no channel'}"
         )
-    probabilities = [p for _, _, p in chosen]
-    best_first = ranked(found, probabilities)
+    best_first = ranked(found)
     pairs = list(itertools.permutations(range(len(chosen)), 2))
-    best = best_first[0] = best_first[0].exactly(pairs, probabilities)
+    best = best_first[0] = best_first[0].exactly(pairs)
     added = {"sensor": best.sensor} if best.sensor else {}
     return NextExperiment(
         text=_text(best, chosen, uncertainty) + _with_more(best, best_first),
@@ -431,11 +456,15 @@ def _pairs(outcomes: Sequence[Outcome], hypotheses: Sequence[Modelled]) -> list[
     there = [o for o in outcomes if not (o.experiment.needs or o.sensor)] or list(outcomes)
     found = []
     for i, j in itertools.combinations(range(len(hypotheses)), 2):
-        alone = [replace(o, distance=o.distance[np.ix_([i, j], [i, j])]) for o in there]
-        chosen = ranked(alone, [0.5, 0.5])[0]
+        at = np.ix_([i, j], [i, j])
+        alone = [
+            replace(o, probabilities=(0.5, 0.5), distance=o.distance[at], shown=o.shown[at])
+            for o in there
+        ]
+        chosen = ranked(alone)[0]
         outcome = there[alone.index(chosen)]
         if outcome is not outcomes[0]:
-            outcome = outcome.exactly([(i, j), (j, i)], [p for _, _, p in hypotheses])
+            outcome = outcome.exactly([(i, j), (j, i)])
         (one, first, _), (other, second, _) = hypotheses[i], hypotheses[j]
         _, size = apart(outcome, i, j, nested=_nested(first, second))
         text = (
@@ -525,7 +554,10 @@ def _text(best: Outcome, hypotheses: Sequence[Modelled], uncertainty: float) -> 
         "doubt between the hypotheses that were fitted."
     )
     if best.bits < _HOPELESS_SHARE * uncertainty:
-        said += " No standard experiment does better with these channels: consider another sensor."
+        said += (
+            " No standard experiment with these channels shows it better than the recordings that "
+            "there are: consider another sensor, or another payload."
+        )
     return said
 
 
