@@ -31,7 +31,7 @@ class Line(str):
     share : float or None
         How much of the work is done, from 0 to 1.
     left : float or None
-        How long it will go on as it looks now [s].
+        Time left at its present pace [s].
     part : str
         Of several that are done at the same time, the one that `share` is of; empty for the whole.
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 _MOST_TOLD = 20
-"""Problems of one file that are told: a screen."""
+"""Problems of one file that are listed: a screen."""
 
 
 class PamrsError(Exception):

@@ -70,7 +70,7 @@ class _Player(Controller):
         Raises
         ------
         ParameterError
-            If a pressure rises while its valves are told to vent.
+            If a pressure rises while its valves are commanded to vent.
         """
         self._before, sent = self._before or dict(measurement), dict(self.rest)
         for name, (valves, begin) in self.begins.items():
@@ -130,7 +130,7 @@ def play(device: Device, commands: Commands, protocol: Protocol, path: Path) -> 
     device : Device
         The plant; ``prepare()``, where it has one, is called first, and ``clock`` is its clock.
     commands : Commands
-        What the bench may be told.
+        Commands that the bench accepts.
     protocol : Protocol
         What is played.
     path : Path

@@ -166,7 +166,7 @@ def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
 
 
 def _copy(copies: dict[Path, Path], folder: Path) -> None:
-    """Copy logs, files or the folders of bags: all beside, then each in its place."""
+    """Copy logs, files or the folders of bags: all to temporary names, then each to its own."""
     import shutil
     import tempfile
 

@@ -68,7 +68,7 @@ def replay_command(
 
 
 def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, Rig | None]:
-    """A case with its own rig, and the model beside it, if there is one."""
+    """A case with its own rig, and the model file next to it, if there is one."""
     from pamrs import rigs
     from pamrs.recordings import load_case, model_and_case
 

@@ -199,7 +199,7 @@ def closed_loop(
     step, initial : optional
         As for :class:`pamrs.Simulator`; not for a simulator.
     sensors : Sensors or Reader, optional
-        What the controller is told; the truth by default. A reader,
+        What the controller reads; the truth by default. A reader,
         ``sensors.started(controller.period)``, goes on from loop to loop, where sensors begin
         again, with their noise and their delay.
     actuation : callable, optional

@@ -1,4 +1,4 @@
-"""A rig that behaves like hardware on a bus: it goes on while nobody looks, readings fail, and time
+"""A rig that behaves like hardware on a bus: it goes on between readings, readings fail, and time
 is not even. For rehearsals.
 """
 

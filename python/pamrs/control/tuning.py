@@ -208,7 +208,7 @@ def gain_map(
     trajectory : Trajectory
     payloads : sequence of float, optional
         ``arm.payload`` [kg], that of the last link, or the mass that hangs; the plant's own by
-        default. The controller is told none of them.
+        default. The controller knows none of them.
     weights : (float, float)
         Of (4.18).
     unit : {"rad", "deg"}

@@ -2,8 +2,8 @@
 numbers in words; those of sealed chambers, and how all of them follow from recordings.
 
 The levels follow from the rig: the lowest pressure at which its arm leaves the stop and the highest
-that keeps it off the other one. Of several chains (valves and their chambers, or regulators) one is
-moved while the others are held, or all are moved at once, none as another one.
+that keeps it off the opposite stop. Of several chains (valves and their chambers, or regulators)
+one is moved while the others are held, or all are moved at once, none as another one.
 """
 
 from __future__ import annotations

@@ -157,7 +157,7 @@ def _points(problem: MapProblem, found: Estimate, rows: Mask, labels: Sequence[s
 
 
 def outlying(problem: MapProblem, found: Estimate, rows: Mask) -> list[tuple[int, float]]:
-    """Points that stand apart, one after the other: each is taken away before the next is sought.
+    """Outliers, one after the other: each is taken away before the next is sought.
 
     The error of a point predicted by the others is ``r_i / (1 - h_i)`` with the hat matrix, its
     standard deviation ``sigma / sqrt(1 - h_i)``; sigma is taken from the median of all points,
@@ -176,7 +176,7 @@ def outlying(problem: MapProblem, found: Estimate, rows: Mask) -> list[tuple[int
     -------
     list of (int, float)
         Place among the fitted rows and weighted error of the prediction from the others. Empty with
-        few points to spare, and when more than 5 stand apart: then it is the model that errs.
+        few points to spare, and when there are more than 5: then it is the model that errs.
     """
     prior = found.sigma * problem.information(found.design)
     matrix, residual = np.vstack([found.jacobian, np.diag(prior)]), found.residual.copy()

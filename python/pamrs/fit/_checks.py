@@ -194,7 +194,7 @@ def absolute_pressures(
     """A note if the forces vanish near ambient pressure, as they do when the pressures are
     absolute.
 
-    At the longest lengths, where the rubber is hardly strained, a line through force over pressure
+    At the longest lengths, where the rubber is hardly stretched, a line through force over pressure
     is zero near zero gauge pressure, or at what it takes to lift the bladder against the braid.
 
     Parameters

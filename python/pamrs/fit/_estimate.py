@@ -355,9 +355,9 @@ def _search(problem: MapProblem, design: Design, rows: Mask, start: Estimate | N
     """Variable projection: least squares over the geometry, with the coefficients solved exactly
     inside.
 
-    Residuals of the priors, ``(value - nominal)/tolerance``, stand beside data residuals divided by
-    their standard deviation; that is estimated from the residuals, and the search repeated until it
-    stays.
+    Residuals of the priors, ``(value - nominal)/tolerance``, are stacked with data residuals
+    divided by their standard deviation; that is estimated from the residuals, and the search
+    repeated until it stays.
     """
     from scipy.optimize import least_squares
 

@@ -116,8 +116,8 @@ def fit_muscle(
         least.
     noise : float, optional
         Known standard deviation of the residuals, in N (with ``weights="level"`` as a fraction);
-        None estimates it. Points count as independent beside the priors; where the misfit is the
-        model's, a larger ``noise`` keeps the geometry nearer to nominal.
+        None estimates it. Points count as independent of each other and of the priors; where the
+        misfit is the model's, a larger ``noise`` keeps the geometry nearer to nominal.
     errors : {"level", "plain"}
         ``"plain"`` standard errors take residuals as independent. Residuals of a quasi-static map
         are mostly model error and hang together along a level; then plain ones are too small.

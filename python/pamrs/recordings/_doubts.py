@@ -335,8 +335,8 @@ def _temperature(name: str, unit: str, values: Array, rig: Rig | None) -> Iterat
 
 
 def _room(name: str, rig: Rig | None) -> tuple[float, float, float]:
-    """Limits of an angle or a length by the rig file, and what it may go beyond them; without a
-    rig file those of every stand, and nothing [SI].
+    """Limits of an angle or a length by the rig file, and what it may go beyond them; without a rig
+    file those of every bench, and nothing [SI].
     """
     given = limits_of(rig, name)
     low, high = given or (_TURNS if channel_of(name) == "joint_angle" else _LENGTHS)

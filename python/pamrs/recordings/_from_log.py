@@ -836,7 +836,7 @@ class Clocks:
         return self._made[key]
 
     def _stamps(self, series: Series, clock: Clock) -> tuple[Array, list[Array]]:
-        """Times of a series [s], and what else stands in the rows."""
+        """Times of a series [s], and what else is in the rows."""
         if clock.column is None:
             time = series.time
             if time is None and self.sample_time is not None:

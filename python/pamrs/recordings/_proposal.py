@@ -171,11 +171,11 @@ _LONG_WORDS: Final = frozenset(
     for word in words
     if len(word) > 2
 )
-"""Words that may stand in a longer one."""
+"""Words that may be part of a longer one."""
 
 
 def channels_of(rig: Rig | None) -> list[str]:
-    """The channels that a stand of this rig can have; all there are without a rig.
+    """The channels that a bench of this rig can have; all there are without a rig.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def channels_of(rig: Rig | None) -> list[str]:
     Returns
     -------
     list of str
-        With the names of its blocks; at the end what is measured beside it, which has none.
+        With the names of its blocks; at the end what is measured outside the rig, which has none.
     """
     if rig is None:
         return [name for name in CHANNELS if name != "time" and name not in _PLAYED]
@@ -224,7 +224,7 @@ def matched(
     matches : list of Match
         In the order of `wanted`.
     left : list of Open
-        Series whose unit is not known, and cannot be told.
+        Series whose unit is not known, and cannot be inferred.
     remarks : list of str
         Units that were assumed, absolute pressures, and commands that this rig has not.
     """
@@ -625,7 +625,7 @@ class Proposal:
         Parameters
         ----------
         folder : Path
-            Where it is to stand; the logs are named from there.
+            Where it is to be written; the logs are named from there.
         rig : str
             The rig file, from there.
 

@@ -146,7 +146,7 @@ def _dropped(data: Array, start: int, stop: int, usual: float) -> bool:
 
 
 def _outliers(data: Array, good: Index) -> list[Fault]:
-    """Spikes of one or two samples that stand off from both sides."""
+    """Spikes of one or two samples that are far from both neighbours."""
     n = len(data)
     if n < _LEAST:
         return []

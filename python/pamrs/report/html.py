@@ -268,8 +268,8 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
 
 
 def _limits(diagnosis: Findings) -> list[tuple[bool | str, ...]]:
-    """Rows of sizes from which the recordings would have shown effects, and told them apart; first
-    of each, True where the effect is named.
+    """Rows of sizes from which the recordings would have shown effects, and distinguished them;
+    first of each, True where the effect is named.
     """
     return [
         (

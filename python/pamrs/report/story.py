@@ -17,7 +17,7 @@ LONGEST = 24
 MOST_RIVALS = 7
 """Explanations that are ranked on the first screen."""
 LEAST_TOLD = 0.05
-"""Probability from which an explanation stands in the title."""
+"""Probability from which an explanation is in the title."""
 AS_MUCH = 0.03
 """Difference of two shares of a mismatch below which both explain as much."""
 

@@ -45,10 +45,10 @@ _LABELS = {
 }
 
 TELLING = 0.25
-"""Distance below nothing or above everything within which a share is told as a number."""
+"""Distance below nothing or above everything within which a share is written as a number."""
 
 FARTHEST = 3.0
-"""Largest end of a share's interval that is told as a number."""
+"""Largest end of a share's interval that is written as a number."""
 
 BUDGET_NOTE = (
     "Shares are of the variance that the nominal model leaves beyond the noise; all values are "
@@ -474,7 +474,7 @@ def missed_sentence(diagnosis: Findings, most: int | None = None) -> str:
     diagnosis : Findings
         What was found.
     most : int, optional
-        Channels that are told at most, then without their noise levels.
+        Channels that are named at most, then without their noise levels.
     """
     answer, told = diagnosis.answer, dict[str, str]()
     for own in answer.missed:

@@ -2,7 +2,7 @@
 
 A rig is blocks around a gas: supplies, valves, lines and chambers that the air goes through,
 muscles, joints and an arm or a load that the force goes through, sensors. Only ``gas`` and
-``chamber`` are always there. A block that stands once needs no name; several of a kind have one
+``chamber`` are always there. A block that occurs once needs no name; several of a kind have one
 each, and ports say which is connected to which. Everything inside is SI; angles are radians,
 pressures gauge.
 """

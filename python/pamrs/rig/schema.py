@@ -1,7 +1,7 @@
 """Every key of a rig file in one table, and the ports by which blocks name each other.
 
-The core tells unit, bounds, usual value and kind of each key, and whether it can carry a
-derivative (``crates/pam-core/src/keys.rs``); the words stand in ``words.toml``.
+The core has unit, bounds, usual value and kind of each key, and whether it can carry a derivative
+(``crates/pam-core/src/keys.rs``); the words are in ``words.toml``.
 """
 
 from __future__ import annotations

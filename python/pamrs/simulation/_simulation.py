@@ -658,7 +658,7 @@ def _is_long(signal: Signals | None) -> bool:
 
 def rows_of(duration: float, sample_time: float, setting: Iterable[str]) -> int:
     """Rows of a duration [s], as many as a run may keep at most; signals that set it are refused
-    beside it.
+    together with it.
     """
     for name in setting:
         raise ParameterError(

@@ -105,7 +105,7 @@ class _Guard:
 
 
 async def _received(request: Request, file: Path) -> None:
-    """Write the body of a request to a new file; a part of it never stands under that name."""
+    """Write the body of a request to a new file; a part of it never has that name."""
     size = 0
     beside = file.with_name(f".{secrets.token_hex(8)}.part")
     try:

@@ -92,7 +92,7 @@ def free_run(
     nominal, final : Rig
         The model of the rig file, and the one with what was found.
     events : Events or None
-        What happened in single recordings, in the place of what `final` says.
+        What happened in single recordings, instead of what `final` says.
     known : KnownValues, optional
         What is known of the values of `final`; without it no channel is said to be off.
     noise_level : dict of NoiseLevel, optional
@@ -101,9 +101,9 @@ def free_run(
     Returns
     -------
     tuple of (list of FreeRun or None, str, list of Trace)
-        One entry for each recording that could be simulated, and what is to be said beside them;
-        None and the reason where no recording has the commands that the rig needs. The curves of
-        the recording that the nominal model misses most, in noise levels, channel by channel.
+        One entry for each recording that could be simulated, and a note on them; None and the
+        reason where no recording has the commands that the rig needs. The curves of the recording
+        that the nominal model misses most, in noise levels, channel by channel.
     """
     runs, missing, curves, most = [], [], list[Trace](), -1.0
     for prepared in (_with_starts(p, problem, by_stage["after"]) for p in problem.recordings):

@@ -183,7 +183,7 @@ def outcome_of(
     """Simulate an experiment with every hypothesis, and compare every pair.
 
     Where experiments are only ranked, each hypothesis has the sensitivities that it has on its own
-    recordings, which are worked out once; :meth:`Outcome.exactly` gives what is told.
+    recordings, which are worked out once; :meth:`Outcome.exactly` gives what is reported.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ def propose(
     settings : DiagnosisSettings, optional
         How experiments are compared; the published ones by default.
     losses : Losses, optional
-        Told of an experiment that fails, which is then left out; raised by default.
+        Notes an experiment that fails, which is then left out; raised by default.
 
     Returns
     -------

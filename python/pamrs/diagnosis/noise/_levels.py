@@ -54,9 +54,9 @@ class NoiseLevel:
     curve_share : float
         Share of the variance of bin means that is the curve error.
     beside_curves : float
-        Standard deviation of bin means beside what its curves tell of them.
+        Standard deviation of bin means about what its curves predict.
     rest_share : float
-        Share of that variance that is curve error which no such curve tells.
+        Share of that variance that is curve error which no such curve predicts.
     curves : (m, k) array or None
         What each curve, one standard deviation high, does to the bin means; None where no curve
         error acts.
@@ -384,7 +384,7 @@ def excess(
 
     Where the model has a curve error, all of the residual is compared with noise and that error
     together; and what its most probable curves leave of it, with what they cost, with the noise
-    beside them. The one that is farther above its limit counts.
+    about them. The one that is farther above its limit counts.
     """
     width = {p.recording.name: bins_of(p) for p in recordings}
     bins = {

@@ -3,10 +3,10 @@
 A regulator whose outlet has no gauge begins a recording somewhere between what it feeds and what it
 is set to: at rest all three are the same, and a log that begins as a stopcock is opened has them
 bars apart; a recording that states its ``initial_pressure`` settles that. Along a tube of segments
-gas stands or flows: at rest its pressure is that of its ends, and a log that begins while air flows
-has a gradient there. What a block predicts from either tells the samples that depend on it; these
-are not judged. A joint begins at rest where that suits what follows better than the slope of its
-first samples.
+gas is at rest or flows: at rest its pressure is that of its ends, and a log that begins while air
+flows has a gradient there. What a block predicts from either tells the samples that depend on it;
+these are not judged. A joint begins at rest where that suits what follows better than the slope of
+its first samples.
 """
 
 from __future__ import annotations

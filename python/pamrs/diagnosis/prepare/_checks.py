@@ -107,7 +107,7 @@ class Check:
     prepared : bool
         True where recordings that are ready to be fitted are needed.
     repeats : Action
-        Sentences of checks with this action stand below a refusal: they may explain it.
+        Sentences of checks with this action are printed below a refusal: they may explain it.
     """
 
     name: str
@@ -700,7 +700,7 @@ AMBIENT_PRESSURE = "ambient_pressure"
 """Used where a recording is read: it makes absolute pressures gauge pressures."""
 _NAME = "gas.temperature"
 _SAME = 0.1
-"""Temperatures that differ by less are told as the same [K]."""
+"""Temperatures that differ by less are reported as the same [K]."""
 
 
 def _rooms(recordings: Sequence[Recording]) -> list[tuple[str, float]]:
@@ -805,8 +805,8 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
     """Recordings without the samples that a sensor reads at the end of its range.
 
     A sensor ends where it ends: the end that one recording shows, by staying there for long, is
-    that of all of them, and a sample there may be of anything beyond. Samples beside one are those
-    of which the noise let through the lower half, and go with it.
+    that of all of them, and a sample there may be of anything beyond. Samples next to such a one
+    are those of which the noise let through the lower half, and go with it.
 
     Returns
     -------

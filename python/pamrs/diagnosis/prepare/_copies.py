@@ -1,13 +1,14 @@
 """Recordings that hold the same samples: a copy is no proof.
 
 Repeated commands give the same signals again, but not the same noise. Two recordings share content
-where one tells the other's samples better than any sample is told by its own neighbours: then its
+where one predicts the other's samples better than its own neighbours predict any sample: then its
 noise is the same, and not its command alone.
 
-A channel's deviations are what its own neighbours do not tell of a sample: of a smooth signal its
-noise, whatever the signal is. Those of a repetition are independent of one another. Those of a copy
-go together at one alignment, however it was filtered, thinned, shifted, reversed or covered by more
-noise. Where the steps of a converter are far wider than the noise, its flips stand in their place.
+A channel's deviations are what its own neighbours do not predict of a sample: of a smooth signal
+its noise, whatever the signal is. Those of a repetition are independent of one another. Those of a
+copy go together at one alignment, however it was filtered, thinned, shifted, reversed or covered by
+more noise. Where the steps of a converter are far wider than the noise, its flips are compared
+instead.
 """
 
 from __future__ import annotations
@@ -41,12 +42,12 @@ class Overlap:
     Attributes
     ----------
     own, other : (start, stop)
-        From when to when in the recording and in the other one [s].
+        From when to when in the recording and in the other recording [s].
     share : float
         Share of the recording's time.
     free : tuple of (start, stop)
-        Stretches of the recording that are not in the other one [s]: beyond its ends, or with noise
-        that it does not tell. Where nothing can be told, the samples count as shared.
+        Stretches of the recording that are not in the other recording [s]: beyond its ends, or with
+        noise that it does not predict. Where nothing can be decided, the samples count as shared.
     """
 
     own: tuple[float, float]
@@ -292,7 +293,7 @@ class _Alignment:
     Attributes
     ----------
     rate, lag : float
-        The sample at a time t [s] is at ``rate t + lag`` [s] of the other one [1, s].
+        The sample at a time t [s] is at ``rate t + lag`` [s] of the other recording [1, s].
     mean : bool
         Whether it is a mean of samples there.
     """
@@ -307,7 +308,7 @@ class _Alignment:
 
 
 class _SharedRows(NamedTuple):
-    """Rows of the slower of two recordings at an alignment: those that lie in the other one, those
+    """Rows of the slower of two recordings at an alignment: those that lie in the faster one, those
     in which some channel's deviations are the same, and those in which all channels that show
     anything differ.
     """
@@ -473,8 +474,8 @@ def _clocks(
     slow_channels: dict[str, _Deviations],
     fast_channels: dict[str, _Deviations],
 ) -> Iterator[tuple[float, float]]:
-    """Rates of the slower recording's clock in the other one, and times from which they run [1, s]:
-    as both say; backwards; sample by sample; as blocks of it are found there.
+    """Rates of the slower clock in the faster one, and times from which they run [1, s]: as both
+    say; backwards; sample by sample; as blocks of it are found there.
     """
     yield 1.0, 0.0
     yield -1.0, fast.duration
@@ -530,7 +531,7 @@ def _alignments_at(
     channels: tuple[dict[str, _Deviations], dict[str, _Deviations]],
     alignment: _Alignment,
 ) -> Iterator[_SharedRows]:
-    """Alignments of one rate at which some channel's deviations are those of the other one."""
+    """Alignments of one rate at which some channel's deviations agree in both recordings."""
     slow_channels, fast_channels = channels
     step = alignment.rate * slow.sample_time
     count = int(fast.duration / abs(step) + 1.5)
@@ -567,7 +568,7 @@ def _single(values: Array) -> NDArray[np.float32]:
 
 
 def _lags(a: _Deviations, b: _Deviations) -> dict[int, float]:
-    """Rows by which one channel may run behind in the other one, and the correlation of their
+    """Rows by which one channel may run behind in the other recording, and the correlation of their
     deviations where these go together there and nowhere else, 0 elsewhere: a command that is
     repeated has its periods too.
     """
@@ -599,7 +600,7 @@ def _lags(a: _Deviations, b: _Deviations) -> dict[int, float]:
 
 
 def _by_window(a: _Deviations, b: _Deviations) -> tuple[Mask, Mask, bool]:
-    """Rows about which the deviations of one channel follow those of the other one, rows about
+    """Rows about which the deviations of one channel follow those of the other channel, rows about
     which they do not, and whether the two differ so clearly that windows can be told apart.
     """
     wanted = a.deviations
@@ -665,8 +666,8 @@ def _between(
     other: dict[str, _Deviations],
 ) -> Iterator[_SharedRows]:
     """Samples of one run that were dealt out to two recordings: those of one lie at a whole
-    fraction between those of the other one and differ by noise alone, and no command that is
-    repeated made both.
+    fraction between those of the second and differ by noise alone, and no command that is repeated
+    made both.
     """
     dt = slow.sample_time
     if abs(dt - fast.sample_time) > 1e-3 * dt or _repeats(slow, fast):

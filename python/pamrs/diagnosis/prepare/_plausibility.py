@@ -587,7 +587,7 @@ def without_dead_commands(
     """Recordings without commands of one value that the pressures behind them contradict.
 
     The channel is left out, where what moves can be judged by its gauges alone; a recording with
-    such a command beside others without one is left out instead, so that these keep their valve.
+    such a command among others without one is left out instead, so that these keep their valve.
 
     Returns
     -------

@@ -491,7 +491,8 @@ def residual(
     parameters : list of str
         Dotted names for the jacobian, may be empty.
     given : Input, optional
-        An input of the block beside what its model makes; the residual then has a `response`.
+        An input of the block in addition to what its model makes; the residual then has a
+        `response`.
     """
     core = _core_of_recording(core, prepared)
     starts = prepared.starts(block.window, block.drives)

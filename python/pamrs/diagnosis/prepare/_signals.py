@@ -59,7 +59,7 @@ _TERMS = 4
 """Terms of a cubic."""
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
-"""Channels at which a rig is cut; of a block with a name its name stands behind it."""
+"""Channels at which a rig is cut, without the names of blocks."""
 DRIVEN_COMMANDS = with_trait("driven")
 
 

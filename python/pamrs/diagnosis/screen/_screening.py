@@ -4,8 +4,8 @@ first.
 An effect at a typical size changes the residuals by a signature. What the baseline parameters
 (inside their tolerances) and the starts of the windows can do is projected out of the signature and
 of the residual; what is left of the residual along what is left of the signature is the gain in
-chi-square that the effect would bring (a score test, Rao 1948, with a finite change in the place of
-the derivative, since many effects have none at zero).
+chi-square that the effect would bring (a score test, Rao 1948, with a finite change instead of the
+derivative, since many effects have none at zero).
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class Screen:
         tangent : Tangent, optional
             Another model than the screen's own (a fitted effect).
         without : tuple of Term
-            Effects to leave out, with those that cannot act beside them.
+            Effects to leave out, with those that cannot act with them.
         """
         space = self.tangent if tangent is None else tangent
         scores = []

@@ -209,8 +209,8 @@ class Attempts:
     def _fit_in_turn(
         self, fitted: Fit, beside: FittedHypothesis, inflation: dict[str, float]
     ) -> Fit:
-        """Refit the persistent effects of a candidate beside its events, then look for the events
-        anew beside these, as long as either leaves much less: effects that were fitted without the
+        """Refit the persistent effects of a candidate with its events, then look for the events
+        anew with these, as long as either leaves much less: effects that were fitted without the
         events had followed them.
         """
         last = self._refit_around_events(fitted, beside, inflation)

@@ -176,7 +176,8 @@ class _Growing:
     tried_sets : set of Hypothesis
         Sets that were fitted.
     likely : list of _Partner
-        What leaves least beside the single hypothesis that weighs most, which the others get too.
+        What leaves least together with the single hypothesis that weighs most, which the others get
+        too.
     """
 
     search: Search
@@ -336,8 +337,8 @@ class _Growing:
     def _telling(self, base: FittedHypothesis) -> list[_Partner]:
         """Partners that take a large share of the mismatch alone.
 
-        The signature of a strong effect beside another one is linear in what is not; where both
-        were fitted, both are known.
+        The signature of a strong effect in the presence of another one is linear in what is not;
+        where both were fitted, both are known.
         """
         telling = [
             c

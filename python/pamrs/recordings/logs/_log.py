@@ -306,7 +306,7 @@ class TextFormat:
     delimiter, decimal, thousands : str, optional
         What separates cells (``" "``: any run of blanks), marks decimals, groups digits.
     header : bool, optional
-        Whether a row of headings stands above the numbers.
+        Whether a row of headings is above the numbers.
     columns : tuple of str, optional
         A name for each column, in order, instead of the file's own.
     """
@@ -355,7 +355,7 @@ class Log:
         Parameters
         ----------
         name : str
-            The whole path, or its end: ``p1`` for ``rig/p1``; or as the heading stands in the file,
+            The whole path, or its end: ``p1`` for ``rig/p1``; or as the heading is in the file,
             with its unit or what an earlier version left of that: ``p1_(bar)``, ``p1_``.
 
         Raises

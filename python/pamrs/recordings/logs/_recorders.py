@@ -252,7 +252,7 @@ def read_mcap(path: Path, form: TextFormat) -> Log:
 
 
 def _mcap_messages(stream: Any, unpacked: Unpacking, unread: dict[str, str]) -> _Messages:
-    """Messages of an MCAP file in the order in which they stand there."""
+    """Messages of an MCAP file in the order of the file."""
     from mcap.records import Channel, Chunk, Message, Schema
     from mcap.stream_reader import StreamReader, breakup_chunk
 

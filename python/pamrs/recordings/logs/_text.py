@@ -146,7 +146,7 @@ def _log_of_lines(
     remarks: Sequence[str] = (),
     comments: Sequence[list[str]] = (),
 ) -> Log:
-    """Log of a table, with what stands above it: cells of comments may be headings."""
+    """Log of a table, with what is above it: cells of comments may be headings."""
     above = _headed(path, body, decimal, form, comments)
     rows = body.after(above.first)
     if len(rows.lines) < 2:
@@ -239,7 +239,7 @@ def _first_row(
 
 
 def _is_dated(row: list[str], kinds: list[str]) -> bool:
-    """True where a time of day stands in a column of numbers: the row is none of the table."""
+    """True where a time of day is in a column of numbers: the row is none of the table."""
     pairs = zip(row, kinds, strict=False)
     times = [cell for cell, kind in pairs if kind == "number" and ":" in cell]
     return any(is_moment(cell.strip()) for cell in times)
@@ -308,8 +308,8 @@ def _headings(
 
 
 def _stated_spacing(above: list[list[str]], begun: list[list[str]], decimal: str) -> float:
-    """Seconds between samples that stand beside a key above a table or in its first rows, or below
-    one above it in a row that is none of numbers; NaN for none.
+    """Seconds between samples that are written next to a key above a table or in its first rows, or
+    below one above it in a row that is none of numbers; NaN for none.
     """
     beside = (pair for row in above + begun for pair in zip(row, row[1:], strict=False))
     rows = zip(above, above[1:], strict=False)
@@ -326,7 +326,7 @@ def _stated_spacing(above: list[list[str]], begun: list[list[str]], decimal: str
 
 
 def _spaced(found: list[Series], spacing: float, remarks: list[str]) -> list[Series]:
-    """Series with times where a column without a name rises by the spacing that stands above the
+    """Series with times where a column without a name rises by the spacing that is given above the
     table, or one counts the samples and nothing else is a clock.
     """
     words = {word for item in found for word in re.findall("[a-z]+", item.name.lower())}
@@ -391,7 +391,7 @@ def _times_shared(clock: Series, name: Series) -> bool:
 def _dated(
     rows: Lines, names: list[str], units: list[str], remarks: list[str]
 ) -> tuple[Lines, list[str], list[str]]:
-    """Rows, names and units with a date and the time of day beside it in one cell."""
+    """Rows, names and units with a date and the time of day next to it in one cell."""
     middle = len(rows.lines) // 2
     some = rows.rows(middle, middle + 1)
     dates = [k for row in some for k, cell in enumerate(row) if is_date(cell)]
