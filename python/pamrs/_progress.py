@@ -172,10 +172,10 @@ def _in_notebook() -> Callable[[str], object]:
     handle: list[Any] = []
 
     def show(line: str) -> None:
-        told = {"text/plain": line.whole if isinstance(line, Line) else line}
+        content = {"text/plain": line.whole if isinstance(line, Line) else line}
         if handle:
-            handle[0].update(told, raw=True)
+            handle[0].update(content, raw=True)
         else:
-            handle.append(display(told, raw=True, display_id=True))
+            handle.append(display(content, raw=True, display_id=True))
 
     return show

@@ -1,4 +1,6 @@
-"""Words that a user should not have to learn: pages, messages and words of effects are plain."""
+"""Words that nobody should have to learn: pages, messages, docstrings, names and words of effects
+are plain.
+"""
 
 import ast
 import re
@@ -25,6 +27,19 @@ PRIVATE = {
     r"strained": "far outside its tolerance",
 }
 FOUND = re.compile(rf"\b(?:{'|'.join(PRIVATE)})\b", re.IGNORECASE)
+
+#: The same in names, in which a group may be quiet by itself.
+PRIVATE_NAME = re.compile(rf"{FOUND.pattern}|\bquiet\b", re.IGNORECASE)
+#: Names with a private word that are published, or called as an option or a key of a file is.
+PUBLISHED = {
+    "cli/__init__.py: with_quiet",
+    "cli/_shared.py: QUIET",
+    "cli/_shared.py: quiet",
+    "cli/_shared.py: with_quiet",
+    "effects/_info.py: told_by",
+    "findings/_answer.py: quiet",
+    "fit/_friction.py: told",
+}
 
 #: Pages of the reproduction, whose tables stay as they are.
 WRITTEN = "docs/reproduction/"
@@ -102,6 +117,19 @@ def test_docstrings_have_no_private_words():
     documented = dict(docstrings())
     assert len(documented) > 3000
     assert not {name: words for name, text in documented.items() if (words := private_words(text))}
+
+
+def test_names_have_no_private_words():
+    defined = {
+        f"{path.relative_to(ROOT / 'python/pamrs').as_posix()}: {name}"
+        for path in (ROOT / "python/pamrs").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if not isinstance(getattr(node, "ctx", None), ast.Load)
+        for name in (getattr(node, key, "") for key in ("name", "asname", "arg", "id", "attr"))
+    }
+    assert {
+        name for name in defined if PRIVATE_NAME.search(re.sub(r"_|(?<=[a-z])(?=[A-Z])", " ", name))
+    } == PUBLISHED
 
 
 #: Words with which no docstring opens: it says at once what a thing is or does.

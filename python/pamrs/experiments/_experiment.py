@@ -178,5 +178,5 @@ def other_payload(rig: Rig) -> tuple[str, float, str] | None:
     if (listed is not None and not others) or (listed is None and now <= 0.0):
         return None
     other = max(others, key=lambda m: abs(m - now)) if others else 0.5 * now
-    told = rig.units.said(name, "kg", other, digits=".3g")
-    return name, other, "" if others else f"another payload, about {told}"
+    load = rig.units.said(name, "kg", other, digits=".3g")
+    return name, other, "" if others else f"another payload, about {load}"

@@ -69,8 +69,8 @@ def _slips(
     for read_as in [units[quantity]] if quantity in units else known:
         for unit in known:
             factor = parse_unit(read_as).scale / parse_unit(unit).scale
-            told = quantity in units or known[0] in (unit, read_as)
-            if told and low <= factor <= high and not np.isclose(factor, 1.0):
+            possible = quantity in units or known[0] in (unit, read_as)
+            if possible and low <= factor <= high and not np.isclose(factor, 1.0):
                 found.append((unit, read_as, factor))
     return found
 

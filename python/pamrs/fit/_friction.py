@@ -398,8 +398,8 @@ def _isometric_levels(data: ForceMap, held: list[Index]) -> tuple[list[FrictionL
         If too few pressures have both branches.
     """
     gas, e, pull, _, way = data.used_rows()
-    told = "loops of pressure at held lengths: rising pressure counts as contracting"
-    issues = [*data.issues, told]
+    note = "loops of pressure at held lengths: rising pressure counts as contracting"
+    issues = [*data.issues, note]
     pairs = []
     for part in held:
         found = _pairs(gas[part], pull[part], way[part])

@@ -335,9 +335,11 @@ def _parameters(
     parameters = {}
     expected, information = problem.expected(found.design)
     for i, (name, unit) in enumerate(zip(found.design.names, found.design.units, strict=True)):
-        told = (float(expected[i]), 1.0 / float(information[i])) if information[i] else (None, None)
+        expectation = (
+            (float(expected[i]), 1.0 / float(information[i])) if information[i] else (None, None)
+        )
         parameters[name] = FitParameter(
-            name, float(found.x[i]), spread[i], unit, spread_plain[i], *told
+            name, float(found.x[i]), spread[i], unit, spread_plain[i], *expectation
         )
     for i, free in enumerate(problem.free, start=len(found.x)):
         known = free.tolerance if math.isfinite(free.tolerance) else None

@@ -196,18 +196,18 @@ class Rig(View):
         return {"blocks": partial(_drawing.draw_blocks, rig=self), **forces}
 
     def _numbers(self) -> dict[str, str]:
-        told = {"rig": self.name, "blocks": ", ".join(self.blocks)}
+        facts = {"rig": self.name, "blocks": ", ".join(self.blocks)}
         for name, table in self.tables("muscle").items():
             full = qualified("muscle", name)
             ends = ((key, table[key]) for key in ("rest_length", "rest_diameter"))
             size = " x ".join(self.units.said(f"{full}.{key}", "m", end) for key, end in ends)
-            told[full] = f"{table['model']}, {size}, {table['count']} of them"
+            facts[full] = f"{table['model']}, {size}, {table['count']} of them"
         for name, table in self.tables("supply").items():
             full = qualified("supply", name)
             begun = self.units.said(f"{full}.initial_pressure", "Pa", table["initial_pressure"])
-            told[full] = f"{table['kind']}, {begun}"
-        told |= {"effects": ", ".join(full_name(e) for e in self.effects)} if self.effects else {}
-        return told | {"cautions": "; ".join(self.cautions) or "none"}
+            facts[full] = f"{table['kind']}, {begun}"
+        facts |= {"effects": ", ".join(full_name(e) for e in self.effects)} if self.effects else {}
+        return facts | {"cautions": "; ".join(self.cautions) or "none"}
 
     @property
     def cautions(self) -> list[str]:

@@ -279,8 +279,8 @@ def _least_missing_step(
         step = np.zeros(at.size)
         step[k] = -0.5 if at[k] > 0.0 else 0.5
         with contextlib.suppress(PamrsError, ArithmeticError):  # it has no slope there
-            beside = run(at + step)
-            slopes[:, k] = (np.concatenate([beside[n] for n in now]) - here) / step[k]
+            stepped = run(at + step)
+            slopes[:, k] = (np.concatenate([stepped[n] for n in now]) - here) / step[k]
     axes, size, directions = np.linalg.svd(slopes, full_matrices=False)
     wanted = axes.T @ (slopes @ at - here)  # along each axis, as an offset from what is known
     # as far as a draw is in as many directions as are seen

@@ -363,8 +363,8 @@ def propose(
             if enough and max(o.bits for o in found) > uncertainty - 0.5 * _RESOLUTION:
                 break  # what is left costs more and cannot tell more
             one = partial(outcome, experiment, sensor)
-            told = one() if losses is None else losses.part(f"experiment {experiment.name}", one)
-            found += [] if told is None else [told]
+            shown = one() if losses is None else losses.part(f"experiment {experiment.name}", one)
+            found += [] if shown is None else [shown]
     if not found:
         raise DiagnosisError(
             f"no experiment of rig {nominal.name!r} can be simulated with all of "

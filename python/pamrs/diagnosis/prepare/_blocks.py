@@ -131,7 +131,7 @@ class Block:
         Longest integration step [s].
     covers : str
         Blocks of the rig that it stands for, in words.
-    beside : tuple of str
+    simulated : tuple of str
         Kinds of block that it simulates as well, since nobody measured them: a regulator whose
         outlet has no gauge.
     tubes : tuple of Tube
@@ -155,7 +155,7 @@ class Block:
     parameters: frozenset[str]
     step: float
     covers: str
-    beside: tuple[str, ...] = ()
+    simulated: tuple[str, ...] = ()
     tubes: tuple[Tube, ...] = ()
     thermometer: str = ""
     anchor: float | None = None
@@ -555,7 +555,7 @@ class _BlockMap:
             drives=(*chamber.drives, chamber.channel),
             window=None,
             covers="gas" + _called(name),
-            beside=("chamber", *chamber.beside),
+            simulated=("chamber", *chamber.simulated),
             anchor=chamber.window,
         )
 

@@ -214,10 +214,10 @@ def _shared_mask(alignment: _SharedRows) -> Mask:
     for first, last in stretches(alignment.other):
         new_rows[first:last] = last - first >= LEAST_SAMPLES
     for first, last in stretches(~new_rows & ~shared & alignment.inside):
-        beside = new_rows[[k for k in (first - 1, last) if 0 <= k < new_rows.size]]
+        neighbours = new_rows[[k for k in (first - 1, last) if 0 <= k < new_rows.size]]
         # what cannot be told is new where noise of its own is on both sides; so is part of a window
         part = last - first < WINDOW_SAMPLES
-        new = beside.any() if part else beside.size == 2 and beside.all()
+        new = neighbours.any() if part else neighbours.size == 2 and neighbours.all()
         shared[first:last] = not new
     return shared
 
@@ -269,7 +269,7 @@ WINDOW_SAMPLES = 64
 LEAST_SAMPLES = 192  # samples that are shared at the least: three windows
 _LAGS = 8  # shifts in time that are looked at
 # neighbours on either side by which a sample is told without the other recording
-_BESIDE_SAMPLES = 4
+_NEIGHBOURS = 4
 # samples of a block that is looked for in a recording whose clock goes otherwise
 _BLOCK_SAMPLES = 256
 
@@ -381,16 +381,14 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     """Channel with the deviation of each sample from what its neighbours predict."""
     index = np.arange(values.size)
     nothing = np.zeros(values.size)
-    if known.sum() < 4 * _BESIDE_SAMPLES or not np.ptp(values[known]) > 0.0:
+    if known.sum() < 4 * _NEIGHBOURS or not np.ptp(values[known]) > 0.0:
         return _Deviations(nothing, known, nothing, 0.0)
     filled = values if known.all() else np.interp(index, index[known], values[known])
-    centred, offsets = filled - filled.mean(), np.r_[-_BESIDE_SAMPLES:0, 1 : _BESIDE_SAMPLES + 1]
-    inner = known & (index >= _BESIDE_SAMPLES) & (index < values.size - _BESIDE_SAMPLES)
+    centred, offsets = filled - filled.mean(), np.r_[-_NEIGHBOURS:0, 1 : _NEIGHBOURS + 1]
+    inner = known & (index >= _NEIGHBOURS) & (index < values.size - _NEIGHBOURS)
     flat = np.diff(centred) == 0.0
     moves = inner & ~(np.r_[False, flat] & np.r_[flat, False])
-    counted = (
-        moves if moves.sum() > 4 * _BESIDE_SAMPLES else inner
-    )  # a rest says nothing of the noise
+    counted = moves if moves.sum() > 4 * _NEIGHBOURS else inner  # a rest says nothing of the noise
     use, deviations, weights = counted, centred, np.zeros(offsets.size)
     for _ in range(4):  # steps of the signal do not say how noise is told
         if use.sum() < 2 * offsets.size:
@@ -406,7 +404,7 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     if not size > 1e-12 * float(np.abs(centred).max()):
         return _Deviations(filled, known, nothing, coarse)
     # a step of the signal is left in all samples beside it
-    steps = uniform_filter1d((counted & ~use).astype(float), 4 * _BESIDE_SAMPLES + 1) > 1e-6
+    steps = uniform_filter1d((counted & ~use).astype(float), 4 * _NEIGHBOURS + 1) > 1e-6
     return _Deviations(filled, known, np.where(inner & ~steps, deviations / size, 0.0), coarse)
 
 
@@ -589,8 +587,8 @@ def _lags(a: _Deviations, b: _Deviations) -> dict[int, float]:
             peak = float(peaks[place])
             if not peak > 0.0:
                 break
-            beside = np.arange(place - WINDOW_SAMPLES, place + WINDOW_SAMPLES + 1)
-            peaks[beside % length] = 0.0
+            around = np.arange(place - WINDOW_SAMPLES, place + WINDOW_SAMPLES + 1)
+            peaks[around % length] = 0.0
             alone = peak > max(_LEAST_PEAK, _PEAK_RATIO * float(peaks.max()))
             lag = place if place < other.size else place - length
             noise_alone = most == 1 and alone and not (a.step and b.step)

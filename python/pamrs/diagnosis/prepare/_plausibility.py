@@ -664,8 +664,8 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         prepared.recording.channels[block.channel][rows],
         predicted(block, core, prepared)[rows],
     )
-    quiet = float(np.std(measured)) < _SENSE_LEAST_NOISES * prepared.noise[block.channel]
-    if quiet or _misfit(measured, model) < _SENSE_WRONG:
+    still = float(np.std(measured)) < _SENSE_LEAST_NOISES * prepared.noise[block.channel]
+    if still or _misfit(measured, model) < _SENSE_WRONG:
         return None
     signals, name = prepared.signals, block.channel
     value, slope = signals[name]

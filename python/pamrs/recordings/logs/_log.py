@@ -18,7 +18,7 @@ from pamrs._files import MOST_SIZE
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.recordings._clock import TIME_UNITS
 from pamrs.recordings._gate import check_size
-from pamrs.recordings.table import NO_VALUE, Table, told_few
+from pamrs.recordings.table import NO_VALUE, Table, first_few
 from pamrs.units import measured_from, parse_unit
 
 _PAIRS: Final = {"[": "]", "(": ")", "{": "}", "<": ">"}
@@ -428,7 +428,7 @@ def table_of(log: Log) -> Table:
 
 
 def _few(names: Iterable[str]) -> str:
-    return told_few(map(repr, names), most=12)
+    return first_few(map(repr, names), most=12)
 
 
 def collected(
