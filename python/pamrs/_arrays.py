@@ -24,7 +24,7 @@ def solve_normal(normal: Array, right: Array) -> Array:
     """Solution of normal equations, also where they are singular.
 
     Each unknown is measured by its own entry of the diagonal, and the ridge is a part of that: an
-    absolute one is lost beside large entries and bends small ones.
+    absolute one is lost next to large entries and bends small ones.
 
     Parameters
     ----------

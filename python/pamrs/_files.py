@@ -220,7 +220,7 @@ def shown(text: str, *, lines: bool = False) -> str:
     """
     if lines:
         text = text.replace("\r\n", "\n")
-    kept = {code: told for code, told in _SHOWN.items() if not lines or code not in (9, 10)}
+    kept = {code: escape for code, escape in _SHOWN.items() if not lines or code not in (9, 10)}
     return text.translate(kept)
 
 

@@ -32,12 +32,12 @@ class Losses:
 
     Attributes
     ----------
-    told : list of str
-        A sentence for each, in the order in which they failed.
+    sentences : list of str
+        One for each, in the order in which they failed.
     """
 
     def __init__(self) -> None:
-        self.told: list[str] = []
+        self.sentences: list[str] = []
         self._lock = threading.Lock()
 
     @overload
@@ -100,5 +100,5 @@ class Losses:
     def tell(self, text: str) -> None:
         """Note a sentence, unless it is noted already."""
         with self._lock:
-            if text not in self.told:
-                self.told.append(text)
+            if text not in self.sentences:
+                self.sentences.append(text)

@@ -31,7 +31,7 @@ class Line(str):
     share : float or None
         How much of the work is done, from 0 to 1.
     left : float or None
-        How long it will go on as it looks now [s].
+        Time left at its present pace [s].
     part : str
         Of several that are done at the same time, the one that `share` is of; empty for the whole.
     """
@@ -172,10 +172,10 @@ def _in_notebook() -> Callable[[str], object]:
     handle: list[Any] = []
 
     def show(line: str) -> None:
-        told = {"text/plain": line.whole if isinstance(line, Line) else line}
+        content = {"text/plain": line.whole if isinstance(line, Line) else line}
         if handle:
-            handle[0].update(told, raw=True)
+            handle[0].update(content, raw=True)
         else:
-            handle.append(display(told, raw=True, display_id=True))
+            handle.append(display(content, raw=True, display_id=True))
 
     return show

@@ -68,10 +68,10 @@ class Tabular:
         except ImportError as error:
             raise missing_package(error, "io") from error
         axes, values, units = self._columns()
-        told = {name: {"units": unit} for name, unit in units.items()}
+        attributes = {name: {"units": unit} for name, unit in units.items()}
         return xr.Dataset(
-            {name: (dims, of, told.get(name)) for name, (dims, of) in values.items()},
-            {name: ((name,), of, told.get(name)) for name, of in axes.items()},
+            {name: (dims, of, attributes.get(name)) for name, (dims, of) in values.items()},
+            {name: ((name,), of, attributes.get(name)) for name, of in axes.items()},
         )
 
     def to_pandas(self) -> pd.DataFrame:

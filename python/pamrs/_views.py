@@ -152,8 +152,8 @@ def over_time(channels: Mapping[str, Iterable[Curve]]) -> Panels:
     heads: dict[str, list[tuple[str, list[Curve]]]] = {}
     for name, series in channels.items():
         heads.setdefault(channel_of(name), []).append((name, list(series)))
-    told: list[str] = [head for head in _TELLING if head in heads] or list(heads)
-    return {head: partial(_draw_channel, head=head, of=heads[head]) for head in told}
+    chosen: list[str] = [head for head in _TELLING if head in heads] or list(heads)
+    return {head: partial(_draw_channel, head=head, of=heads[head]) for head in chosen}
 
 
 def _draw_channel(axes: Any, head: str, of: list[tuple[str, list[Curve]]]) -> None:

@@ -18,8 +18,9 @@ _ROOM: Final = 1 << 20
 
 
 def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path:
-    """Write `content` to a temporary file beside `path`, then rename: readers never see half a
-    file. A new file has the mode that the process gives to files, one that was there keeps its own.
+    """Write `content` to a temporary file in the folder of `path`, then rename: readers never see
+    half a file. A new file has the mode that the process gives to files, one that was there keeps
+    its own.
     """
     target = Path(os.path.realpath(path))  # through a symbolic link, not over it
     data = content.encode("utf-8") if isinstance(content, str) else content

@@ -45,14 +45,14 @@ class Channel:
     Attributes
     ----------
     name : str
-        Where a rig has several blocks of a kind, the name of the block stands behind a dot:
+        Where a rig has several blocks of a kind, the name of the block follows a dot:
         ``muscle_pressure.flexor``.
     unit : str
         SI unit; pressures gauge, but for the ambient one.
     lower, upper : float
         Range of the possible, SI.
     block : str
-        Kind of the blocks of a rig that have it; empty for what is measured beside the rig.
+        Kind of the blocks of a rig that have it; empty for what is measured outside the rig.
     words, hints : str
         Words by which logs call it: one of `words` is enough, `hints` are shared with others.
     sensor : str
@@ -60,13 +60,13 @@ class Channel:
     traits : str
         Words: ``command`` (drives the rig or says where it should go, and holds from sample to
         sample), ``driven`` (a command that a rig takes from recordings), ``pressure`` (a gauge in
-        the air of the rig), ``needed`` (nearly every diagnosis takes it), ``extra`` (few stands
+        the air of the rig), ``needed`` (nearly every diagnosis takes it), ``extra`` (few benches
         have it), ``clips`` (its sensor ends at a rail), ``steady`` (may stay at one value),
         ``unjudged`` (no fault of a sensor is sought), ``rests`` (stops and dry friction hold it
         still), ``moves`` (an encoder may read it), ``slow`` (need not last as long as the others),
-        ``surroundings`` (what the rig stands in; a diagnosis sets the rig by it), ``named`` (never
-        found by a weak word or by its unit alone), ``strong`` (never found by a weak word alone),
-        ``played`` (of files that are played; no log has it).
+        ``surroundings`` (conditions around the rig; a diagnosis sets the rig by it), ``named``
+        (never found by a weak word or by its unit alone), ``strong`` (never found by a weak word
+        alone), ``played`` (of files that are played; no log has it).
     units : tuple of str
         SI units of what it may be, where that is not `unit` alone.
     only : tuple of str, optional

@@ -81,7 +81,7 @@ def problems_of(
     Parameters
     ----------
     prefix : str
-        What stands before a key in messages.
+        Text before a key in messages.
     given : mapping
         The table.
     rules : mapping of str to Rule

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-_MOST_TOLD = 20
-"""Problems of one file that are told: a screen."""
+_MOST_LISTED = 20
+"""Problems of one file that are listed: a screen."""
 
 
 class PamrsError(Exception):
@@ -117,6 +117,6 @@ def joined(head: str, problems: Iterable[str]) -> str:
     found = list(problems)
     if len(found) == 1:
         return f"{head}: {found[0]}"
-    told = [f"  - {line}" for line in found[:_MOST_TOLD]]
-    more = [f"  - and {len(found) - _MOST_TOLD} more"] if len(found) > _MOST_TOLD else []
-    return "\n".join([f"{head}: {len(found)} problems", *told, *more])
+    lines = [f"  - {line}" for line in found[:_MOST_LISTED]]
+    more = [f"  - and {len(found) - _MOST_LISTED} more"] if len(found) > _MOST_LISTED else []
+    return "\n".join([f"{head}: {len(found)} problems", *lines, *more])

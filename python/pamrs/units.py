@@ -6,8 +6,8 @@ angle, the volt and the ampere count as dimensions of their own, so that a press
 is an error and not a number; inside a compound unit (``N m/rad``) the angle may be left out.
 
 Pressures are gauge pressures, and a unit may say so: ``"bar(g)"``, ``"barg"``, ``"psi gauge"``. An
-absolute one (``"bar(a)"``, ``"psia"``, ``"kPa abs"``) is told by :func:`measured_from`, and read
-only where there is an ambient pressure to subtract.
+absolute one (``"bar(a)"``, ``"psia"``, ``"kPa abs"``) is recognised by :func:`measured_from`, and
+read only where there is an ambient pressure to subtract.
 """
 
 from __future__ import annotations
@@ -229,7 +229,7 @@ def measured_from(unit: str) -> tuple[str, str]:
     Returns
     -------
     unit : str
-        The unit alone; where no such words stand behind a unit of pressure, what was given.
+        The unit alone; where no such words follow a unit of pressure, what was given.
     kind : str
         ``"gauge"``, ``"absolute"``, or empty where it does not say.
 
@@ -382,7 +382,7 @@ def from_si(value: float, unit: str, dimension: str, *, difference: bool = False
 
 
 def with_unit(number: str, unit: str) -> str:
-    """A number with its unit behind it, as people read it: a plain number stands alone.
+    """A number with its unit behind it, as people read it: a plain number has none.
 
     Parameters
     ----------

@@ -143,7 +143,7 @@ def test_an_experiment_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) 
     found = _choice.propose(rig, sets, losses=losses)
     assert found.ranking
     assert failed[0] not in [entry.name for entry in found.ranking]
-    assert len(losses.told) == 1
+    assert len(losses.sentences) == 1
     failed.clear()
     with pytest.raises(np.linalg.LinAlgError):
         _choice.propose(rig, sets)
@@ -176,7 +176,7 @@ def test_an_interrupt_is_no_loss(lenient: None) -> None:
     losses = Losses()
     with pytest.raises(KeyboardInterrupt):
         losses.part("this", interrupted)
-    assert losses.told == []
+    assert losses.sentences == []
 
 
 @pytest.mark.parametrize("scale", [1e-20, 1.0, 1e20])

@@ -91,13 +91,17 @@ CHANNELS = ("supply_command", *ONE_GAUGE)
 def test_the_chamber_simulates_a_regulator_that_has_no_gauge() -> None:
     blocks = blocks_of(JOINT, CHANNELS)
     assert set(blocks) == {"chamber", "arm"}
-    assert blocks["chamber"].beside == ("supply",)
+    assert blocks["chamber"].simulated == ("supply",)
     assert blocks["chamber"].covers == "regulator, line and chamber"
     assert "supply.time_constant" in blocks["chamber"].parameters
     assert acts_in(Term("supply_regulator_deadband"), blocks["chamber"])
     assert not acts_in(Term("supply_regulator_deadband"), blocks["arm"])
     both = blocks_of(JOINT, (*CHANNELS, "supply_pressure"))
-    assert {name: b.beside for name, b in both.items()} == {"supply": (), "chamber": (), "arm": ()}
+    assert {name: b.simulated for name, b in both.items()} == {
+        "supply": (),
+        "chamber": (),
+        "arm": (),
+    }
 
 
 def test_its_prediction_is_that_of_a_simulation() -> None:

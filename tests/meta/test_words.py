@@ -1,14 +1,13 @@
-"""Words that a user should not have to learn: pages, messages and words of effects are plain."""
+"""Words that nobody should have to learn: pages, messages, docstrings, names and words of effects
+are plain.
+"""
 
 import ast
-import inspect
 import re
 import tomllib
 from pathlib import Path
 
 import pytest
-
-import pamrs
 
 ROOT = Path(__file__).parents[2]
 
@@ -28,6 +27,19 @@ PRIVATE = {
     r"strained": "far outside its tolerance",
 }
 FOUND = re.compile(rf"\b(?:{'|'.join(PRIVATE)})\b", re.IGNORECASE)
+
+#: The same in names, in which a group may be quiet by itself.
+PRIVATE_NAME = re.compile(rf"{FOUND.pattern}|\bquiet\b", re.IGNORECASE)
+#: Names with a private word that are published, or called as an option or a key of a file is.
+PUBLISHED = {
+    "cli/__init__.py: with_quiet",
+    "cli/_shared.py: QUIET",
+    "cli/_shared.py: quiet",
+    "cli/_shared.py: with_quiet",
+    "effects/_info.py: told_by",
+    "findings/_answer.py: quiet",
+    "fit/_friction.py: told",
+}
 
 #: Pages of the reproduction, whose tables stay as they are.
 WRITTEN = "docs/reproduction/"
@@ -93,23 +105,31 @@ def test_messages_have_no_private_words():
     assert not found
 
 
-def public_docstrings():
-    """Docstrings of what `import pamrs` offers, methods and properties included."""
-    for name in pamrs.__all__:
-        thing = getattr(pamrs, name)
-        if inspect.isclass(thing) or inspect.isfunction(thing):
-            yield name, inspect.getdoc(thing) or ""
-            yield from (
-                (f"{name}.{own}", inspect.getdoc(value) or "")
-                for own, value in (vars(thing).items() if inspect.isclass(thing) else ())
-                if not own.startswith("_")
-            )
+def docstrings():
+    """Place and text of every docstring, and of every string that documents a name."""
+    for path in sorted((ROOT / "python/pamrs").rglob("*.py")):
+        for entry in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(entry, ast.Expr) and isinstance(entry.value, ast.Constant):
+                yield f"{path.relative_to(ROOT)}:{entry.lineno}", str(entry.value.value)
 
 
-def test_public_docstrings_have_no_private_words():
-    documented = dict(public_docstrings())
-    assert len(documented) > 100
+def test_docstrings_have_no_private_words():
+    documented = dict(docstrings())
+    assert len(documented) > 3000
     assert not {name: words for name, text in documented.items() if (words := private_words(text))}
+
+
+def test_names_have_no_private_words():
+    defined = {
+        f"{path.relative_to(ROOT / 'python/pamrs').as_posix()}: {name}"
+        for path in (ROOT / "python/pamrs").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if not isinstance(getattr(node, "ctx", None), ast.Load)
+        for name in (getattr(node, key, "") for key in ("name", "asname", "arg", "id", "attr"))
+    }
+    assert {
+        name for name in defined if PRIVATE_NAME.search(re.sub(r"_|(?<=[a-z])(?=[A-Z])", " ", name))
+    } == PUBLISHED
 
 
 #: Words with which no docstring opens: it says at once what a thing is or does.
@@ -117,14 +137,7 @@ INDIRECT = re.compile(r"(?:What|Whether|Where|How|Those|The same)\b")
 
 
 def test_docstrings_open_with_what_a_thing_is_or_does():
-    documented = [
-        (f"{path.relative_to(ROOT)}: {entry.lineno}", str(entry.value.value))
-        for path in (ROOT / "python/pamrs").rglob("*.py")
-        for entry in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(entry, ast.Expr) and isinstance(entry.value, ast.Constant)
-    ]
-    assert len(documented) > 3000
-    assert not [(name, text) for name, text in documented if INDIRECT.match(text.strip())]
+    assert not [(name, text) for name, text in docstrings() if INDIRECT.match(text.strip())]
 
 
 def test_words_of_effects_are_not_private():

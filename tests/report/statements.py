@@ -145,7 +145,7 @@ def _of_headlines(found: Diagnosis, page: str, summary: str) -> list[Statement]:
 def _of_chances(found: Diagnosis, page: str) -> list[Statement]:
     """Probabilities in bars, facts, headline and text, by name and place."""
     told = [
-        Statement(f"probability of {row.name}", row.told, "rivals") for row in story.rivals(found)
+        Statement(f"probability of {row.name}", row.chance, "rivals") for row in story.rivals(found)
     ]
     rows = re.findall(r'<tr><th>([^<]*)</th><td class="track">.*?num">([^<]*)</td>', page)
     told += [Statement(f"probability of {name}", p, "page") for name, p in rows if "%" not in p]

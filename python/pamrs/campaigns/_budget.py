@@ -64,12 +64,12 @@ class Budget:
 
     def passed(self, cost: Cost) -> str:
         """Limits that a cost would pass, in words; empty where it passes none."""
-        told = [
+        limits = [
             (cost.seconds / _MINUTE, self.minutes, "minutes"),
             (float(cost.runs), float(self.runs), "runs"),
             (cost.litres, self.air, "litres of air"),
         ]
-        return next((f"{v:.3g} of {most:g} {what}" for v, most, what in told if v > most), "")
+        return next((f"{v:.3g} of {most:g} {what}" for v, most, what in limits if v > most), "")
 
 
 def cost_of(experiment: Experiment, rig: Rig, settle: float) -> Cost:

@@ -218,9 +218,9 @@ def proposed(
         why = "The same once more: whether it comes out alike says what chance leaves."
         return ProposedRun(allowed[name], why, repeat, rivals) if name else None
     parting = (pair for pair in own.pairs if pair.noises is None or pair.noises >= _LEAST_NOISES)
-    told = next((pair for pair in parting if pair.experiment in allowed), None)
-    if told is not None:
-        return ProposedRun(allowed[told.experiment], told.text, repeat, rivals)
+    separating = next((pair for pair in parting if pair.experiment in allowed), None)
+    if separating is not None:
+        return ProposedRun(allowed[separating.experiment], separating.text, repeat, rivals)
     return _showing(diagnosis, allowed, blind, rivals)
 
 

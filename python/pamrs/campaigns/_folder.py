@@ -53,7 +53,7 @@ class Step:
     rivals : list of dict
         What predicted it: ``label``, ``probability``, ``model`` (its file).
     before : dict or None
-        What was known before, as :func:`told`.
+        What was known before, as :func:`short_form`.
     bits : float or None
         What it was expected to tell [bit].
     spent : list of float
@@ -172,14 +172,14 @@ class Folder:
 
     def save(self) -> None:
         """Write what is known, whole or not at all."""
-        told = {
+        content = {
             "schema": SCHEMA,
             "rig": self.rig.name,
             "ended": self.ended,
             "shows": self.shows,
             "steps": [to_plain(asdict(step)) for step in self.steps],
         }
-        write_atomically(self.path / _FILE, json.dumps(told, indent=1, allow_nan=False) + "\n")
+        write_atomically(self.path / _FILE, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
     def home(self, step: Step) -> Path:
         """The folder of a step."""
@@ -268,13 +268,13 @@ class Folder:
 
     def _foretell(self, home: Path, proposal: ProposedRun) -> list[dict[str, Any]]:
         """Write the models of all rivals, and what each shows in this experiment."""
-        told, heads = list[dict[str, Any]](), ["time [s]"]
+        predicted, heads = list[dict[str, Any]](), ["time [s]"]
         columns: list[Array] = []
         heard = [n for n in measurable(self.rig) if n not in proposal.experiment.commands]
         for k, (label, rig, probability) in enumerate(proposal.rivals, 1):
             file = home / f"rival_{k}.toml"
             write_atomically(file, rig.to_toml_text())
-            told.append({"label": label, "probability": probability, "model": file.name})
+            predicted.append({"label": label, "probability": probability, "model": file.name})
             try:
                 run = proposal.experiment.simulate(rig)
             except SimulationError:  # it leaves the range of its model: that is seen as well
@@ -289,7 +289,7 @@ class Folder:
         if columns:
             rows = [",".join(f"{value:.6g}" for value in row) for row in np.column_stack(columns)]
             write_atomically(home / "foretold.csv", "\n".join([",".join(heads), *rows]) + "\n")
-        return told
+        return predicted
 
     def rivals(self, step: Step) -> list[tuple[str, Rig, float]]:
         """The models that predicted a step."""
@@ -306,7 +306,7 @@ def columns_of(file: Path) -> dict[str, Array]:
         return dict(zip(heads, np.loadtxt(lines, delimiter=",", ndmin=2).T, strict=True))
 
 
-def told(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
+def short_form(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
     """Short form of a diagnosis, as a step keeps it."""
     if diagnosis is None:
         return None

@@ -24,7 +24,7 @@ from pamrs.campaigns._choice import (
     shows_of,
     unseen,
 )
-from pamrs.campaigns._folder import Folder, Step, told
+from pamrs.campaigns._folder import Folder, Step, short_form
 from pamrs.campaigns._page import write_pages
 from pamrs.campaigns._play import play
 from pamrs.control.live import Device
@@ -301,7 +301,7 @@ class _Work:
             )
         if proposal is not None:
             cost = pool.costs[proposal.experiment.name]
-            step = self.folder.propose(proposal, cost, self.commands, told(self.found))
+            step = self.folder.propose(proposal, cost, self.commands, short_form(self.found))
             write_pages(self.folder)
             return self.say(f"step {step.number}: {step.name}")
         helps = f"What would help: {asked_for(self.found, pool)}"
@@ -378,7 +378,7 @@ class _Work:
                 f"{self.folder.path / step.recordings[-1]} cannot be diagnosed with the others: "
                 f"{error}; step {step.number} takes another recording"
             ) from error
-        step.after = told(self.found)
+        step.after = short_form(self.found)
         step.changed = _changed(step.before, step.after)
         self.folder.save()
         if self.found is not None:

@@ -22,21 +22,21 @@ _MOST_PANELS: Final = 4
 
 def write_pages(folder: Folder) -> None:
     """Write a page of the last step, and one of the whole campaign."""
-    told = [_told(folder, step) for step in folder.steps]
-    if told:
+    entries = [_entry(folder, step) for step in folder.steps]
+    if entries:
         last = folder.steps[-1]
-        own = [{**told[-1], "report": "report.html" if last.after else ""}]
+        own = [{**entries[-1], "report": "report.html" if last.after else ""}]
         title = f"Step {last.number}: {last.name.replace('_', ' ')}"
         write_atomically(folder.home(last) / "page.html", _page(folder, title, own, ""))
     text = folder.ended.get("text", "")
-    write_atomically(folder.path / "campaign.html", _page(folder, "All steps", told, text))
+    write_atomically(folder.path / "campaign.html", _page(folder, "All steps", entries, text))
 
 
 def _page(folder: Folder, title: str, steps: list[dict[str, Any]], ended: str) -> str:
     return render_page(_TEMPLATE, title=title, rig=folder.rig.name, steps=steps, ended=ended)
 
 
-def _told(folder: Folder, step: Step) -> dict[str, Any]:
+def _entry(folder: Folder, step: Step) -> dict[str, Any]:
     """Text of a step on its page."""
     before, after = step.before or {}, step.after or {}
     chances = [own.get("probabilities", {}) for own in (before, after)]
@@ -75,13 +75,15 @@ def _left(step: Step, label: str) -> str:
 
 def _open(after: dict[str, Any]) -> str:
     """Open questions, in words."""
-    told = [f"{' or '.join(map(set_label, after['ambiguity']))}"] if after.get("ambiguity") else []
-    if after and not after["settled"] and not told:
-        told.append("the answer is not settled")
+    questions = (
+        [f"{' or '.join(map(set_label, after['ambiguity']))}"] if after.get("ambiguity") else []
+    )
+    if after and not after["settled"] and not questions:
+        questions.append("the answer is not settled")
     if after.get("unseen"):
         effects = listed([hypothesis_label(name) for name in after["unseen"]])
-        told.append(f"even if there, not seen at the usual size: {effects}")
-    return "; ".join(told) + "." if told else "Nothing."
+        questions.append(f"even if there, not seen at the usual size: {effects}")
+    return "; ".join(questions) + "." if questions else "Nothing."
 
 
 def _picture(folder: Folder, step: Step) -> Markup:

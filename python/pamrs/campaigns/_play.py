@@ -70,7 +70,7 @@ class _Player(Controller):
         Raises
         ------
         ParameterError
-            If a pressure rises while its valves are told to vent.
+            If a pressure rises while its valves are commanded to vent.
         """
         self._before, sent = self._before or dict(measurement), dict(self.rest)
         for name, (valves, begin) in self.begins.items():
@@ -84,12 +84,12 @@ class _Player(Controller):
             then = max(self._before.get(name, 0.0), begin)
             vents = gap < 0.0 and all(sent[valve] < null for valve, null in valves.items())
             if vents and now > then + _RISEN:
-                told = ", ".join(
+                levels = ", ".join(
                     f"{valve} = {sent[valve]:.4g} V, below null_voltage = {null:.4g} V,"
                     for valve, null in valves.items()
                 )
                 raise ParameterError(
-                    f"{told} vents by the rig file, and {name} rose from {then:.4g} to {now:.4g} "
+                    f"{levels} vents by the rig file, and {name} rose from {then:.4g} to {now:.4g} "
                     "Pa: the sign of the command is wrong, or the ports of the valve are swapped"
                 )
         return sent
@@ -130,7 +130,7 @@ def play(device: Device, commands: Commands, protocol: Protocol, path: Path) -> 
     device : Device
         The plant; ``prepare()``, where it has one, is called first, and ``clock`` is its clock.
     commands : Commands
-        What the bench may be told.
+        Commands that the bench accepts.
     protocol : Protocol
         What is played.
     path : Path
@@ -170,10 +170,10 @@ def play(device: Device, commands: Commands, protocol: Protocol, path: Path) -> 
         raise KeyboardInterrupt
     if run.reason != "finished":
         why = recorder.trouble or "the machine was too late"
-        told = ", ".join(f"{k} = {v:g} {unit_of(k)}" for k, v in commands.safe.items())
+        safe = ", ".join(f"{k} = {v:g} {unit_of(k)}" for k, v in commands.safe.items())
         raise LiveError(
             f"device = {called}: stopped after {len(run.time) * period:.3g} s ({run.reason}): "
-            f"{why}; an answer is needed every {period:g} s; the safe command ({told}) was "
+            f"{why}; an answer is needed every {period:g} s; the safe command ({safe}) was "
             f"written, {kept}",
             run,
         )

@@ -90,8 +90,8 @@ class Recorder:
         self.device.write(command)
         due, self.due = self.due, None
         if due is not None:
-            told = command if isinstance(command, Mapping) else {self.commands[0]: command}
-            self._keep(due, told)
+            values = command if isinstance(command, Mapping) else {self.commands[0]: command}
+            self._keep(due, values)
 
     def _keep(self, reading: Mapping[str, float], command: Mapping[str, float]) -> None:
         if not self._kept:

@@ -89,11 +89,11 @@ class SerialDevice:
         self._port = os.open(self.name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
             _raw(self._port, baud)
-            taken, told = self._greet(positive("patience", patience))
+            taken, channels = self._greet(positive("patience", patience))
         except BaseException:
             self.close()
             raise
-        self.commands, self.channels = tuple(taken), tuple(told)
+        self.commands, self.channels = tuple(taken), tuple(channels)
 
     def read(self) -> Mapping[str, float]:
         """The channels now [SI]."""
@@ -121,9 +121,9 @@ class SerialDevice:
         if set(given) != set(self.commands) or not all(map(math.isfinite, given.values())):
             needed = f"a finite number for each of {', '.join(self.commands)} is needed"
             raise refused("command", command, f"{needed} by {self.name}")
-        told = self._ask("W " + " ".join(f"{given[name]:.7g}" for name in self.commands))
-        if told != ["OK"]:
-            raise OSError(f"{self.name}: the board refused {given}: {' '.join(told[1:])}")
+        answer = self._ask("W " + " ".join(f"{given[name]:.7g}" for name in self.commands))
+        if answer != ["OK"]:
+            raise OSError(f"{self.name}: the board refused {given}: {' '.join(answer[1:])}")
 
     def close(self) -> None:
         """Let the port go."""
@@ -134,13 +134,13 @@ class SerialDevice:
         end = _time.monotonic() + patience
         while _time.monotonic() < end:
             try:
-                told = self._ask("?", _AGAIN)
+                answer = self._ask("?", _AGAIN)
             except TimeoutError:
                 continue
-            if told[:1] == [_HELLO] and ">" in told[2:-1]:
-                at = told.index(">")
-                return told[1:at], told[at + 1 :]
-            raise OSError(f"{self.name}: answered {' '.join(told)!r}: no board of this protocol")
+            if answer[:1] == [_HELLO] and ">" in answer[2:-1]:
+                at = answer.index(">")
+                return answer[1:at], answer[at + 1 :]
+            raise OSError(f"{self.name}: answered {' '.join(answer)!r}: no board of this protocol")
         raise TimeoutError(
             f"{self.name}: nothing answered for {patience:g} s; a board with "
             "examples/pamrs_board.ino is needed, at the same --baud"

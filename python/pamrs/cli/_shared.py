@@ -218,11 +218,11 @@ def document(schema: str, **content: Any) -> str:
             raise TypeError(f"{type(part).__name__} cannot be written as JSON")
         return part.to_dict()
 
-    told = {"schema": schema, **content}
-    return json.dumps(told, indent=1, allow_nan=False, default=plain) + "\n"
+    whole = {"schema": schema, **content}
+    return json.dumps(whole, indent=1, allow_nan=False, default=plain) + "\n"
 
 
-def write(contents: Contents, told: str = "") -> None:
+def write(contents: Contents, text: str = "") -> None:
     """Write every file that is wanted and say so, then print what was found; a file that fails does
     not keep the others, or the text, from coming.
 
@@ -232,7 +232,7 @@ def write(contents: Contents, told: str = "") -> None:
     ----------
     contents : dict of Path or None to str, bytes or callable
         The files.
-    told : str, optional
+    text : str, optional
         What was found, as text.
 
     Raises
@@ -262,10 +262,10 @@ def write(contents: Contents, told: str = "") -> None:
             failed.append(f"{path} ({why})")
         else:
             note(f"written: {path}")
-    if told and isinstance(contents.get(STDOUT), str):
-        note(told.removesuffix("\n"))
-    elif told:
-        typer.echo(told.removesuffix("\n"))
+    if text and isinstance(contents.get(STDOUT), str):
+        note(text.removesuffix("\n"))
+    elif text:
+        typer.echo(text.removesuffix("\n"))
     if refused is not None:
         raise refused
     if failed:

@@ -2,7 +2,7 @@
 name.
 
 A stream that takes nothing (closed, a full disk, a reader that is gone) ends no work: what it was
-to say goes to the other one, and the exit code says so at the end.
+to say goes to the other stream, and the exit code says so at the end.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class _Guarded(io.TextIOBase):
         return True
 
     def write(self, text: str) -> int:
-        """Write text; where the stream takes none, to the other one."""
+        """Write text; where this stream takes none, to the other stream."""
         encoding = self.encoding
         safe = shown(text, lines=True).encode(encoding, "backslashreplace").decode(encoding)
         if not self._sent(safe) and self.other is not None:

@@ -86,18 +86,18 @@ def _joint(
         muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke
     )
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
-    told, found = title, None
+    heading, found = title, None
     given: dict[str, Any] = {} if evaluations is None else {"evaluations": evaluations}
     with counted("designs") as say:
         if minimise_pressure:
             found = least_pressure(problem, seed=seed, progress=say, **given)
-            told = f"{title}: {_least(problem, found)}"
+            heading = f"{title}: {_least(problem, found)}"
         found = found or optimise(problem, seed=seed, progress=say, **given)
     contents: Contents = {
         json: _document(title, seed, found) if json else "",
         rig_joint: found.to_toml() if rig_joint else "",
     }
-    write(contents, f"{told}\n{found.summary()}")
+    write(contents, f"{heading}\n{found.summary()}")
 
 
 # ------------------------------------------------------------------------- inputs

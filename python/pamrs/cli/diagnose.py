@@ -172,7 +172,7 @@ def _outside_recorded(protocol: Protocol, case: Case) -> list[str]:
 
     from pamrs.report.text import sized
 
-    told = []
+    warnings = []
     for name, values in protocol.commands.items():
         recorded = [r.channels[name] for r in case.recordings if name in r.channels]
         seen = np.concatenate([v[np.isfinite(v)] for v in recorded] or [np.empty(0)])
@@ -183,11 +183,11 @@ def _outside_recorded(protocol: Protocol, case: Case) -> list[str]:
         if values.min() < low - margin or values.max() > high + margin:
             ends = (float(values.min()), float(values.max()), low, high)
             first, last, least, most = (sized(v, protocol.units[name]) for v in ends)
-            told.append(
+            warnings.append(
                 f"{name} goes from {first} to {last}, and was recorded from {least} to {most}: "
                 "check that the rig can take this before you play it"
             )
-    return told
+    return warnings
 
 
 def _model_text(result: Diagnosis, case: Case, file: Path) -> str:

@@ -377,10 +377,10 @@ def _inputs(context: typer.Context) -> _MapInputs:
     given, data = context.params, context.params["data"]
     if data.suffix.lower() == ".toml":
         others = ("muscle", *GEOMETRY, "where", "clipped")
-        beside = [key for key in others if given[key] or given[key] == ""]
-        if beside:
+        excluded = [key for key in others if given[key] or given[key] == ""]
+        if excluded:
             raise ParameterError(
-                f"{', '.join(map(option, beside))} cannot be given: {data} describes its table "
+                f"{', '.join(map(option, excluded))} cannot be given: {data} describes its table "
                 "and its muscle itself"
             )
         from pamrs.fit import load_measured_muscle

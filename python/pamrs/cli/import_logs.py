@@ -84,7 +84,7 @@ def import_command(
     for item in proposal.logs:
         _show(item)
     folder = out or Path()
-    named, contents = _rig_beside(rig, folder, copy=copy, written=out is not None)
+    named, contents = _rig_entry(rig, folder, copy=copy, written=out is not None)
     if copies:
         logs = [
             replace(item, log=replace(item.log, path=copies.get(item.log.path, item.log.path)))
@@ -103,8 +103,10 @@ def import_command(
     write(contents)
     outside = not copy and any(not is_inside(file.parent, path) for path in used)
     allowed = " --allow-outside" if outside else ""
-    beside = file.parent / "rig.toml"
-    missing = "" if rig is not None or beside.exists() else f", put the rig file there as {beside}"
+    expected = file.parent / "rig.toml"
+    missing = (
+        "" if rig is not None or expected.exists() else f", put the rig file there as {expected}"
+    )
     folder_name = shlex.quote(str(file.parent))
     if (held := proposal.held_out) is not None:
         name = Path(os.path.relpath(resolved(held.log.path), resolved(folder))).as_posix()
@@ -120,31 +122,31 @@ def _spacing(text: str) -> float:
     return step
 
 
-def _rig_beside(
+def _rig_entry(
     rig: Path | None, folder: Path, *, copy: bool, written: bool
 ) -> tuple[str, Contents]:
     """Name of the rig file in ``case.toml``, and its text where it has to be written there."""
-    beside = folder / "rig.toml"
+    default = folder / "rig.toml"
     if rig is None:
-        return beside.name, {}
+        return default.name, {}
     if rig.exists() and (not copy or is_inside(folder, rig)):
         return Path(os.path.relpath(resolved(rig), resolved(folder))).as_posix(), {}
     if rig.exists():
-        check_new(beside)
-        return beside.name, {beside: rig.read_text(encoding="utf-8")}
+        check_new(default)
+        return default.name, {default: rig.read_text(encoding="utf-8")}
     from pamrs import rigs
 
     template = rigs.template(str(rig), str(rig), "coefficients")
     if (
         written
-        and beside.exists()
-        and beside.read_text(encoding="utf-8", errors="replace") != template
+        and default.exists()
+        and default.read_text(encoding="utf-8", errors="replace") != template
     ):
         raise FileExistsError(
-            f"{beside}: is there already, and is not {rig}; it is not overwritten: give it as "
+            f"{default}: is there already, and is not {rig}; it is not overwritten: give it as "
             "--rig, or another --out"
         )
-    return beside.name, {beside: template}
+    return default.name, {default: template}
 
 
 def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
@@ -166,19 +168,19 @@ def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
 
 
 def _copy(copies: dict[Path, Path], folder: Path) -> None:
-    """Copy logs, files or the folders of bags: all beside, then each in its place."""
+    """Copy logs, files or the folders of bags: all to temporary names, then each to its own."""
     import shutil
     import tempfile
 
     with tempfile.TemporaryDirectory(prefix=".copies-", dir=folder) as place:
         made = {Path(place) / str(number): pair for number, pair in enumerate(copies.items())}
-        for beside, (path, _) in made.items():
+        for temporary, (path, _) in made.items():
             if path.is_dir():
-                shutil.copytree(path, beside)
+                shutil.copytree(path, temporary)
             else:
-                shutil.copyfile(path, beside)
-        for beside, (_, target) in made.items():
-            beside.rename(target)
+                shutil.copyfile(path, temporary)
+        for temporary, (_, target) in made.items():
+            temporary.rename(target)
 
 
 def _show(item: LogProposal) -> None:

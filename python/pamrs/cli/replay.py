@@ -50,7 +50,7 @@ def replay_command(
     chosen = _chosen(found, recording)
     shown = next((r for r in chosen if r.role == "held_out"), chosen[0])
     drawn: Simulation | None = None
-    beside: Simulation | None = None
+    compared: Simulation | None = None
     for one in chosen:
         typer.echo(f"{one.name} ({one.role.replace('_', ' ')}, {one.duration:.4g} s)")
         with progress(f"simulating {one.name}"):
@@ -59,16 +59,18 @@ def replay_command(
             typer.echo(line)
         if one is shown:
             drawn = own or nominal
-            beside = None if own is None else nominal
+            compared = None if own is None else nominal
     if plot is not None and drawn is not None:
         from pamrs.report.motion import write_channels
 
         result, recorded = drawn, usable_samples(shown)
-        write({plot: lambda path: write_channels(result, path, recorded=recorded, nominal=beside)})
+        write(
+            {plot: lambda path: write_channels(result, path, recorded=recorded, nominal=compared)}
+        )
 
 
 def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, Rig | None]:
-    """A case with its own rig, and the model beside it, if there is one."""
+    """A case with its own rig, and the model file next to it, if there is one."""
     from pamrs import rigs
     from pamrs.recordings import load_case, model_and_case
 
@@ -120,6 +122,6 @@ def _lines(nominal: Simulation | None, own: Simulation | None, recording: Record
     found = []
     for name in before | after:
         unit, factor = laboratory_unit(name)
-        told = [f"{factor * errors[name]:.4g}" for errors in (before, after) if name in errors]
-        found.append(with_unit(f"  {name}: rms difference {' -> '.join(told)}", unit))
+        sizes = [f"{factor * errors[name]:.4g}" for errors in (before, after) if name in errors]
+        found.append(with_unit(f"  {name}: rms difference {' -> '.join(sizes)}", unit))
     return found

@@ -37,8 +37,8 @@ def _rig_check(file: RigName) -> None:
     shown = {}
     for name, own in rig.parameters.items():
         unknown = with_unit("unknown", rig.units.of(name, own.unit))
-        told = rig.units.said(name, own.unit, own.value, own.tol, ".6g") if own.known else unknown
-        shown[name] = told
+        value = rig.units.said(name, own.unit, own.value, own.tol, ".6g") if own.known else unknown
+        shown[name] = value
     shown |= _of_effects(rig)
     shown |= {name: f"{shown[name]}, another one in each recording" for name in rig.own}
     width = max(map(len, shown), default=0)

@@ -106,8 +106,8 @@ def simulate_command(
 
         for name, rms in differences(result, recording).items():
             unit, factor = laboratory_unit(name)
-            told = f"{name}: rms difference from the recording {factor * rms:.4g}"
-            lines.append(with_unit(told, unit))
+            line = f"{name}: rms difference from the recording {factor * rms:.4g}"
+            lines.append(with_unit(line, unit))
     files: Contents = {
         output: lambda path: _write_csv(path, result),
         plot: lambda path: _plot(path, result, recorded),

@@ -95,7 +95,7 @@ class AdaptiveSliding(SlidingController):
         self.hold_at_limit = bool(hold_at_limit)
         self._parameters = arm.parameters
         self._names = tuple(f"_{parameter.name}" for parameter in self._parameters)
-        self._look = operator.attrgetter(*self._names)
+        self._getter = operator.attrgetter(*self._names)
         self._others = range(1, len(self._names))
         self._STATE = {p.name: p.value for p in self._parameters}  # type: ignore[misc]
         self._bounds = _bounds(arm, bounds)
@@ -124,7 +124,7 @@ class AdaptiveSliding(SlidingController):
             time, measurement, reference
         )
         columns = arm.regressor(angle, motion, rate, acceleration)
-        estimates = self._look(self)
+        estimates = self._getter(self)
         torque = estimates[0] * columns[0]
         for k in self._others:
             torque = torque + estimates[k] * columns[k]

@@ -1,6 +1,6 @@
 """Rigs for linear models: effects without a derivative are refused, the others are held at rest.
 
-What each effect asks for stands in the catalogue (:class:`pamrs.effects.EffectInfo`).
+The catalogue (:class:`pamrs.effects.EffectInfo`) has what each effect asks for.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Model-based feedforward (dissertation 4.3.2, (4.11)-(4.14)), alone and beside an output
+"""Model-based feedforward (dissertation 4.3.2, (4.11)-(4.14)), alone and together with an output
 feedback.
 """
 
@@ -98,7 +98,7 @@ class Feedforward(SampledController):
         dissertation has it (the pressure is its only measurement, 4.3.2.1), or of the joint.
     lengthening : TorqueModel, optional
         Torque of the muscles while they lengthen, taken for ``P_d`` where the commanded rate is
-        below zero: (4.7) in the place of (4.4). By default the arm's own torque, both ways.
+        below zero: (4.7) instead of (4.4). By default the arm's own torque, both ways.
     pressure_filter : float or ndarray, shape (n,)
         Time constant of the low-pass on the pressure [s].
     rate_filter, angle_filter, measured_rate
@@ -221,9 +221,8 @@ class Parallel(SampledController):
     feedforward : Feedforward
         The model's part.
     feedback : Controller
-        PID, fuzzy or another that answers valve volts. One with ``answer`` (as these have) is told
-        of the feedforward before its limits, so that its anti-windup knows when the sum is at a
-        limit.
+        PID, fuzzy or another that answers valve volts. One with ``answer`` (as these have) is given
+        the feedforward before its limits, so that its anti-windup knows when the sum is at a limit.
 
     Raises
     ------

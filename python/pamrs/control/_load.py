@@ -113,9 +113,9 @@ def shortened(reference: Reference, rest_length: float) -> Reference:
 class ByLength(SampledController):
     """A controller of a joint's angle, made to follow the length of the muscles that lift a mass.
 
-    The controller is told the shortening ``L0 - L`` [m] and its rate for angle and rate, of what is
-    measured and of the reference, whose ``angle`` is then a length [m]. Its gains are per metre. A
-    :class:`pamrs.control.RigController` does so by itself.
+    The controller is given the shortening ``L0 - L`` [m] and its rate for angle and rate, of what
+    is measured and of the reference, whose ``angle`` is then a length [m]. Its gains are per metre.
+    A :class:`pamrs.control.RigController` does so by itself.
 
     Parameters
     ----------

@@ -92,13 +92,13 @@ class ClosedLoop(View, Tabular):
         return over_time(lines)
 
     def _numbers(self) -> dict[str, str]:
-        told = {"rig": self.rig.name, "time": f"{self.time[-1] - self.time[0]:.4g} s"}
+        numbers = {"rig": self.rig.name, "time": f"{self.time[-1] - self.time[0]:.4g} s"}
         for name, error in zip(self.joints, np.atleast_2d(self.error), strict=True):
             sizes = {"rms": np.sqrt(np.mean(error**2)), "largest": np.abs(error).max()}
             sizes["last"] = error[-1]
             for word, size in sizes.items():
-                told[f"{word} error of {name}"] = in_laboratory_units(name, size)
-        return told | {"events": str(len(self.events))}
+                numbers[f"{word} error of {name}"] = in_laboratory_units(name, size)
+        return numbers | {"events": str(len(self.events))}
 
     def metrics(self, joint: str | None = None, *, unit: str | None = None) -> Metrics:
         """Errors, curvature and phases, see :func:`pamrs.control.metrics.evaluate`.
@@ -199,7 +199,7 @@ def closed_loop(
     step, initial : optional
         As for :class:`pamrs.Simulator`; not for a simulator.
     sensors : Sensors or Reader, optional
-        What the controller is told; the truth by default. A reader,
+        What the controller reads; the truth by default. A reader,
         ``sensors.started(controller.period)``, goes on from loop to loop, where sensors begin
         again, with their noise and their delay.
     actuation : callable, optional

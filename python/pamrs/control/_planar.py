@@ -8,8 +8,8 @@ q_i`` it reads (Spong, Hutchinson & Vidyasagar, *Robot Modeling and Control*, ch
     tau_i = sum_j A_ij (cos(phi_i - phi_j) phi_j'' + sin(phi_i - phi_j) phi_j'^2) + B_i g sin(phi_i)
 
 and the torque of a joint is the sum of those on its link and all beyond. With the rate of a sliding
-surface in the place of one of the two in ``phi_j'^2`` the matrix ``H' - 2 C`` stays skew (Slotine &
-Li, Applied Nonlinear Control, 1991, 9.1).
+surface instead of one of the two in ``phi_j'^2`` the matrix ``H' - 2 C`` stays skew (Slotine & Li,
+Applied Nonlinear Control, 1991, 9.1).
 """
 
 from __future__ import annotations

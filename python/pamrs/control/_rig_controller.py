@@ -112,7 +112,7 @@ class RigController(SampledController):
         Of joints with muscles on both sides [N m/rad], see :class:`CoContraction`; the least
         pressures by default.
     shares : mapping of str to Share, optional
-        Joint -> how its muscles share the torque, in the place of :class:`Together` or
+        Joint -> how its muscles share the torque, instead of :class:`Together` or
         :class:`CoContraction`; a share by itself for a rig of one joint.
     air : {"loop", "flow"} or mapping of str to AirWay, optional
         From a wanted pressure to a valve's command: a pressure loop with a gain by the valve's

@@ -159,7 +159,7 @@ class RigModel:
         period : float
             [s]
         **changes
-            Arguments of the class, in the place of what is scaled.
+            Arguments of the class, instead of those that are scaled.
 
         Returns
         -------

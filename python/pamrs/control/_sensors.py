@@ -31,7 +31,7 @@ class Sensors:
         Channel -> step of the quantiser [SI unit]; the value is the nearest multiple.
     delay : float
         How old every channel is [s], a multiple of the controller's period; before anything is old
-        enough the first sample stands.
+        enough the first sample is held.
     seed : int
         Of the noise.
 
@@ -88,7 +88,7 @@ class Sensors:
 class Reader:
     """Sensors in use: called with each sample of the plant, it says what is read.
 
-    Made by :meth:`Sensors.started`. Given to a loop in the place of sensors it goes on from loop to
+    Made by :meth:`Sensors.started`. Given to a loop instead of sensors it goes on from loop to
     loop, and its :attr:`state` can be kept, so that a loop with noise or a delay can be cut
     anywhere.
 

@@ -114,7 +114,7 @@ class LiveRun:
     reference : ndarray, shape (rows,)
         Reference angle [rad]; of several joints (joints, rows).
     command : ndarray, shape (rows,), or mapping of str to ndarray
-        What the plant was told to hold; of several commands each by its name.
+        What the plant was commanded to hold; of several commands each by its name.
     channels : mapping of str to ndarray, shape (rows,)
         What was read; NaN where nothing was.
     late : ndarray, shape (rows,)

@@ -1,4 +1,4 @@
-"""A rig that behaves like hardware on a bus: it goes on while nobody looks, readings fail, and time
+"""A rig that behaves like hardware on a bus: it goes on between readings, readings fail, and time
 is not even. For rehearsals.
 """
 
@@ -146,8 +146,8 @@ class SimulatedDevice:
         """Command that is held: a number for a single one, else a mapping by name; regulators that
         feed a valve are left out until they are written.
         """
-        told = {name: self._held[name] for name in self._needed}
-        return next(iter(told.values())) if len(told) == 1 else told
+        held = {name: self._held[name] for name in self._needed}
+        return next(iter(held.values())) if len(held) == 1 else held
 
     def write(self, command: float | Mapping[str, float]) -> None:
         """Hold a command from now on.

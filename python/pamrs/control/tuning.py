@@ -96,14 +96,14 @@ class GainMap(View, Tabular):
         axes.plot(row[names[0]], row[names[1]] if grid[1:] else row["j"], "x", color=COLOURS[1])
 
     def _numbers(self) -> dict[str, str]:
-        told = {}
+        numbers = {}
         for row in self.best():
             gains = ", ".join(f"{name} = {row[name]:.4g}" for name in self.axes)
             error = in_laboratory_units("joint_angle", row["rms"])
-            told[f"best with {row['payload']:g} kg"] = f"{gains}: J {row['j']:.4g}, rms {error}"
+            numbers[f"best with {row['payload']:g} kg"] = f"{gains}: J {row['j']:.4g}, rms {error}"
         edges = {name: (axis[0], axis[-1]) for name, axis in self.axes.items() if len(axis) > 1}
         border = {n for row in self.best() for n, ends in edges.items() if row[n] in ends}
-        return told | ({"on the border of the map": ", ".join(sorted(border))} if border else {})
+        return numbers | ({"on the border of the map": ", ".join(sorted(border))} if border else {})
 
     def best(self, by: str = "j") -> list[dict[str, float]]:
         """The gains with the smallest metric, payload by payload.
@@ -208,7 +208,7 @@ def gain_map(
     trajectory : Trajectory
     payloads : sequence of float, optional
         ``arm.payload`` [kg], that of the last link, or the mass that hangs; the plant's own by
-        default. The controller is told none of them.
+        default. The controller knows none of them.
     weights : (float, float)
         Of (4.18).
     unit : {"rad", "deg"}

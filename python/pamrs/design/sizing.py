@@ -204,7 +204,7 @@ class Candidate:
     def from_library(
         cls, item: str | Entry, *, pressure: float | None = None, count: int | None = None
     ) -> Candidate:
-        """A muscle of :mod:`pamrs.library`; at the highest pressure of its tests unless told.
+        """A muscle of :mod:`pamrs.library`; by default at the highest pressure of its tests.
 
         Parameters
         ----------
@@ -453,7 +453,7 @@ def size(
     requirement : Requirement
         Force wanted over the stroke.
     filling : Filling, optional
-        Supply and valve; the shoulder's unless told.
+        Supply and valve; the shoulder's by default.
     core : float
         Diameter kept free in the middle of the bundle [m].
     max_count : int

@@ -289,7 +289,13 @@ def _diagnosis_of_ready_case(
     # the first few are all that a terminal shows: first what may make the answer wrong
     # a unit that is found settles what was doubted under the one that was said
     doubts = ready.doubts if misread is None else []
-    warnings = [*fit_problem.losses.told, *ready.suspected, *doubts, *start_notes, *ready.told]
+    warnings = [
+        *fit_problem.losses.sentences,
+        *ready.suspected,
+        *doubts,
+        *start_notes,
+        *ready.notes,
+    ]
     warnings += [*diagnosis.warnings, *ready.masked, *moved]
     values_of = {
         p.recording.name: p.recording.parameters
@@ -407,10 +413,10 @@ def _under_best_law(
         )
         return *_with_offsets(fitted, held_out, rig)[:2], unjudged
 
-    best, quiet = stated, Steps(None, within=_JUDGED)
+    best, silent = stated, Steps(None, within=_JUDGED)
     for choice, recordings in promising_laws(case.rig, fit_problem, stated, divided):
         with suppress(PamrsError):  # a rig that these recordings cannot be of
-            other, _, _ = _diagnosis_in_units_said(case.with_rig(choice.rig), *recordings, quiet)
+            other, _, _ = _diagnosis_in_units_said(case.with_rig(choice.rig), *recordings, silent)
             best = under(choice, other, stated) if is_better(other, best) else best
     return best
 
@@ -555,7 +561,7 @@ def _judged_only(
     """Recordings without the blocks whose judgement failed."""
     judged = {block.name for group in groups for block in group.blocks}
     if not judged:
-        raise DiagnosisError("; ".join(fit_problem.losses.told))
+        raise DiagnosisError("; ".join(fit_problem.losses.sentences))
     fitted = replace(fit_problem, blocks=[b for b in fit_problem.blocks if b.name in judged])
     same, blocks = held_out_problem is fit_problem, fitted.blocks
     return fitted, fitted if same else replace(held_out_problem, blocks=blocks)

@@ -180,7 +180,7 @@ def _copies(products: Array, curves: int, count: int) -> Array:
     return np.where(acting, np.sqrt(error / np.where(acting, power, 1.0)), math.inf)
 
 
-def _beside_error(products: Array, curves: int, copies: Array) -> Array:
+def _without_error(products: Array, curves: int, copies: Array) -> Array:
     """Products of a block's baseline and signatures after the error of its model is fitted out: its
     curves, and a small copy of every effect (no model errs in functions of place alone).
     """
@@ -240,7 +240,7 @@ class Limits:
             copies[block] = np.minimum(copies.get(block, math.inf), sizes)
             alone = np.diag(_freed(values[curves:, curves:], k))
             shown_alone[place] = np.sqrt(np.clip(alone, 0.0, None) / settings.effective_samples)
-        rest = (_beside_error(v, v.shape[0] - k - count, copies[b]) for b, v in of_block.items())
+        rest = (_without_error(v, v.shape[0] - k - count, copies[b]) for b, v in of_block.items())
         total = np.asarray(sum(rest))
         # a parameter beyond its tolerances is a rival, too: its own column without a prior
         free = total - total[:, :k] @ solve_normal(total[:k, :k] + np.eye(k), total[:k])

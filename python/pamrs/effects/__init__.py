@@ -1,7 +1,7 @@
 """The catalogue of omitted physics: id, block, equation, parameters, fingerprint and rivals of each
 effect.
 
-Equations, parameters, bounds and sources stand in the core, one file for each effect
+Equations, parameters, bounds and sources are in the core, one file for each effect
 (``crates/pam-core/src/effects``), and its words here in ``words/ID.toml``. Public are
 :data:`EFFECTS`, :data:`CATALOGUE`, the types of their entries, what is said to be missing
 (:class:`Term`, :class:`Hypothesis`), and :mod:`pamrs.effects.text`.

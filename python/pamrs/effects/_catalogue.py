@@ -26,19 +26,19 @@ def _words(effect: str) -> dict[str, Any]:
     return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
-def _parameter(told: dict[str, Any], meanings: dict[str, str]) -> EffectParameter:
+def _parameter(stated: dict[str, Any], meanings: dict[str, str]) -> EffectParameter:
     """A parameter, as the core tells it, with its words."""
-    own: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in told.items()}
-    own |= {key: told[key] or "" for key in ("role", "role_sealed")}
-    return EffectParameter(**own, meaning=meanings[told["name"]])
+    own: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in stated.items()}
+    own |= {key: stated[key] or "" for key in ("role", "role_sealed")}
+    return EffectParameter(**own, meaning=meanings[stated["name"]])
 
 
-def _form(told: dict[str, Any], meanings: dict[str, str], equation: str) -> Form:
+def _form(stated: dict[str, Any], meanings: dict[str, str], equation: str) -> Form:
     return Form(
-        name=told["name"],
-        parameters=tuple(_parameter(parameter, meanings) for parameter in told["parameters"]),
-        states=tuple(state["name"] for state in told["states"]),
-        ports=tuple(told["ports"]),
+        name=stated["name"],
+        parameters=tuple(_parameter(parameter, meanings) for parameter in stated["parameters"]),
+        states=tuple(state["name"] for state in stated["states"]),
+        ports=tuple(stated["ports"]),
         equation=equation,
     )
 
@@ -47,9 +47,9 @@ def _form(told: dict[str, Any], meanings: dict[str, str], equation: str) -> Form
 _OF_CORE: Final = ("block", "at", "last_only", "on_loads", "frees_mass", "dry_friction")
 
 
-def _info(told: dict[str, Any]) -> EffectInfo:
+def _info(stated: dict[str, Any]) -> EffectInfo:
     """One effect, as the core tells it, with its words."""
-    words = _words(told["id"])
+    words = _words(stated["id"])
     terms = tuple(
         ClosureTerm(**{**term, "variables": tuple(term["variables"])})
         for term in words.get("terms", ())
@@ -58,43 +58,43 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         **{term.name: f"coefficient of {term.formula}" for term in terms},
         **words["parameters"],
     }
-    usual, *others = told["forms"]
+    usual, *others = stated["forms"]
     equations = {usual["name"]: words["equation"]}
     equations |= {form["name"]: words["forms"][form["name"]] for form in others}
-    kink = told["kink"]
+    kink = stated["kink"]
     excitation = words.get("excitation", {}).items()
     return EffectInfo(
-        id=told["id"],
-        forms=tuple(_form(form, meanings, equations[form["name"]]) for form in told["forms"]),
-        reference=told["source"],
-        catalogue=told["named"],
+        id=stated["id"],
+        forms=tuple(_form(form, meanings, equations[form["name"]]) for form in stated["forms"]),
+        reference=stated["source"],
+        catalogue=stated["named"],
         same_data=tuple(
             SameData(
                 **{**same, "held": tuple(map(tuple, same["held"])), "told_by": words["told_by"]}
             )
-            for same in told["same_data"]
+            for same in stated["same_data"]
         ),
         terms=terms,
         excitation=tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in excitation),
-        acts_in=tuple(told["acts_in"]),
-        supplies=tuple(told["supplies"]),
+        acts_in=tuple(stated["acts_in"]),
+        supplies=tuple(stated["supplies"]),
         kink=None
         if kink is None
         else (tuple(kink["where_not_zero"]), kink["why"], kink["of_supplies"]),
-        at_rest=tuple((act, *change) for one in told["at_rest"] for act, change in one.items()),
+        at_rest=tuple((act, *change) for one in stated["at_rest"] for act, change in one.items()),
         rivals=tuple(words.get("rivals", ())),
         stated_by=tuple(words.get("stated_by", ())),
         like_values=tuple(words.get("like_values", ())),
         most=dict(words.get("most", {})),
         bench_units=tuple(BenchUnit(**unit) for unit in words.get("bench_units", ())),
-        **{key: told[key] for key in _OF_CORE},
+        **{key: stated[key] for key in _OF_CORE},
         **{key: words[key] for key in ("name", "equation", "fingerprint", "separates")},
         **{key: words.get(key, "") for key in ("label", "experiment", "shares", "bench")},
     )
 
 
 EFFECTS: Final[dict[str, EffectInfo]] = {
-    told["id"]: _info(told) for told in json.loads(_core.effects())
+    stated["id"]: _info(stated) for stated in json.loads(_core.effects())
 }
 """Every effect by its id, in the order of the chain; sums of terms last."""
 CATALOGUE: Final[dict[str, EffectInfo]] = {

@@ -131,7 +131,7 @@ class SameData:
 
 @dataclass(frozen=True, slots=True)
 class ClosureTerm:
-    """One term of a sum that stands where no name does.
+    """One term of a sum that is fitted where no named effect explains the data.
 
     Attributes
     ----------
@@ -275,8 +275,7 @@ class EffectInfo:
         Other effects whose recordings it leaves where a parameter is zero, each in rigs that have
         what that one acts on; of several in one rig the first.
     terms : tuple of ClosureTerm
-        Of a sum of terms, in the order of its parameters; behind them stand the shapes of its
-        memories.
+        Of a sum of terms, in the order of its parameters; the shapes of its memories follow.
     label : str
         Short name for tables and figures; the id in words by default.
     stated_by : tuple of str
@@ -299,7 +298,7 @@ class EffectInfo:
     bench : str
         What to do on the bench to see it or to be rid of it.
     bench_units : tuple of BenchUnit
-        How its parameters are told on a bench, where not in the usual units.
+        Units of its parameters on a bench, where these are not the usual ones.
     excitation : tuple of (str, value)
         The same for a program: ``kind`` and numbers with their unit in the name.
     last_only : bool

@@ -106,7 +106,7 @@ class Term:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A set of terms, and what is said beside them or in their absence.
+    """A set of terms, and what is said with them or in their absence.
 
     Two hypotheses are equal if they have the same terms, in whatever order, and the same `rest`.
 
@@ -116,7 +116,7 @@ class Hypothesis:
         In the order in which they are shown.
     rest : str
         ``none`` (nothing is missing), ``parameters`` (values moved inside their tolerances),
-        ``unlisted`` (something without a name is missing; it may stand beside terms), or empty.
+        ``unlisted`` (something without a name is missing; it may come with terms), or empty.
 
     Examples
     --------

@@ -449,7 +449,7 @@ def pressure_range(rig: Rig, *, highest: float | Mapping[str, float] | None = No
     Range
         With an arm or a load, from where it has moved by a twentieth of its range to nine tenths of
         it; without one, from a tenth to six tenths of the supply's pressure. Never above what the
-        rig file says that the stand allows.
+        rig file says that the bench allows.
 
     Raises
     ------

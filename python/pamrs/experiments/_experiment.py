@@ -86,7 +86,7 @@ class Experiment:
         return (self.rows - 1) * self.sample_time
 
     def changed(self, rig: Rig) -> Rig:
-        """The rig as it stands in this experiment."""
+        """The rig as it is in this experiment."""
         return rig.with_parameters(self.changes) if self.changes else rig
 
     def simulate(self, rig: Rig) -> Simulation:
@@ -106,8 +106,8 @@ class Experiment:
 class QuantityFormatter(Formatter):
     """Formatter of the texts of experiments, in the units of a rig's file.
 
-    Numbers that a text marks ``{level:bar}``, ``{length:mm.3g}``, are in that unit, and told in the
-    one of the rig, which ``{bar}`` stands for: as fine as hundredths of a bar and tenths of a
+    Numbers that a text marks ``{level:bar}``, ``{length:mm.3g}``, are in that unit, and written in
+    the rig's unit, which ``{bar}`` stands for: as fine as hundredths of a bar and tenths of a
     millimetre, or as their format says.
     """
 
@@ -178,5 +178,5 @@ def other_payload(rig: Rig) -> tuple[str, float, str] | None:
     if (listed is not None and not others) or (listed is None and now <= 0.0):
         return None
     other = max(others, key=lambda m: abs(m - now)) if others else 0.5 * now
-    told = rig.units.said(name, "kg", other, digits=".3g")
-    return name, other, "" if others else f"another payload, about {told}"
+    load = rig.units.said(name, "kg", other, digits=".3g")
+    return name, other, "" if others else f"another payload, about {load}"

@@ -114,7 +114,7 @@ def _rounded(frequencies: Array) -> list[float]:
 
 
 def _rounded_levels(
-    row: Row, span: Range, rounded: Callable[[float], float], told: QuantityFormatter
+    row: Row, span: Range, rounded: Callable[[float], float], formatter: QuantityFormatter
 ) -> dict[str, Any]:
     """Levels of a row and reaches around them, rounded as texts have them."""
     level = [rounded(span.at(share)) for share in row.get("told", row.get("levels", ()))]
@@ -122,7 +122,7 @@ def _rounded_levels(
     return {
         "level": level,
         "middle": level[0] if level else math.nan,
-        "words": told.each(level, "bar"),
+        "words": formatter.each(level, "bar"),
         "reach": [rounded(share * (span.high - span.low)) for share in row.get("reaches", ())],
         "step": step,
         "step_told": round(step, 4),
@@ -154,7 +154,7 @@ class Maker:
     highest: float | Mapping[str, float] | None
 
     @cached_property
-    def told(self) -> QuantityFormatter:
+    def formatter(self) -> QuantityFormatter:
         """Formatter of texts in the units of the rig's file."""
         return QuantityFormatter(self.rig)
 
@@ -267,7 +267,7 @@ class Maker:
             name, mass, needs = found
             changes, rig = {name: mass}, rig.with_parameters({name: mass})
             facts = {**facts, "payload": mass, "payload_told": round(mass, 3)}
-        text = self.told.format(row["text"], **facts) + also[0]
+        text = self.formatter.format(row["text"], **facts) + also[0]
         numbers = {k: facts[v] if isinstance(v, str) else v for k, v in row["numbers"].items()}
         numbers |= also[1]
         if self.chains[0].regulator is not None:
@@ -278,7 +278,7 @@ class Maker:
                 text += slower
             if length is None:
                 held = self.frame.held
-                text = f"with the length held at {self.told.each([in_mm(held)], 'mm')}, {text}"
+                text = f"with the length held at {self.formatter.each([in_mm(held)], 'mm')}, {text}"
                 numbers["length_mm"] = in_mm(held)
                 length = np.full(next(iter(references.values())).size, held)
             else:
@@ -314,7 +314,7 @@ class Maker:
             inside = np.clip(values, span.low, span.high)
             found[name] = limited(inside, frame.pressure_rate * self.dt)
             slower |= bool(np.abs(found[name] - inside).max() > 0.01 * (span.high - span.low))
-        most = self.told.each([frame.pressure_rate * 1e-5], "bar.2g")
+        most = self.formatter.each([frame.pressure_rate * 1e-5], "bar.2g")
         return found, f", the pressure by no more than {most}/s" if slower else ""
 
     def _one(self, row: Row, chain: Chain, **options: Any) -> Experiment | None:
@@ -325,7 +325,7 @@ class Maker:
             most = max(share for _, share in row["cycle"]) - min(s for _, s in row["cycle"])
             periods[-1] = self._period(periods[-1], most * (span.high - span.low))
         legs = _legs(row, periods)
-        facts = {**self._facts(row, chain), **_rounded_levels(row, span, in_bar, self.told)}
+        facts = {**self._facts(row, chain), **_rounded_levels(row, span, in_bar, self.formatter)}
         facts |= {"periods": periods, "period": periods[-1] if periods else math.nan}
         reference = _course(legs, self._begin(chain), span, self.dt)
         reference = options.pop("reference", reference)
@@ -340,7 +340,7 @@ class Maker:
         references: dict[str, Array] = {
             c.name: np.interp(time, [0.0, 2.0], [self._begin(c), held[c.name]]) for c in others
         }
-        levels = [self.told.each([in_bar(held[c.name])], "bar") for c in others]
+        levels = [self.formatter.each([in_bar(held[c.name])], "bar") for c in others]
         same = _listed(levels if len(set(levels)) > 1 else levels[:1])
         return self._driven(
             row,
@@ -365,7 +365,7 @@ class Maker:
             moved = span.at(0.5) + size * _wave(frequencies, time, 2.0 * k)
             references[own.name] = begin + faded * (moved - begin)
             used[own.name] = _rounded(frequencies)
-        own_levels = _rounded_levels(row, self._reach(chain), in_bar, self.told)
+        own_levels = _rounded_levels(row, self._reach(chain), in_bar, self.formatter)
         facts = self._facts(row, chain) | own_levels
         facts |= self._levels() | {
             "frequencies": used if count > 1 else used[chain.name],
@@ -378,7 +378,7 @@ class Maker:
         """Ranges of the pressures of all chains, in words and in bar."""
         spans = {c.name: self._reach(c) for c in self.chains}
         levels = {n: [in_bar(s.low), in_bar(s.high)] for n, s in spans.items()}
-        words = [f"{n} between {self.told.each(ends, 'bar')}" for n, ends in levels.items()]
+        words = [f"{n} between {self.formatter.each(ends, 'bar')}" for n, ends in levels.items()]
         return {"words": _listed(words), "levels": levels}
 
     def _orders(self, row: Row, chain: Chain) -> Experiment | None:
@@ -391,7 +391,7 @@ class Maker:
             legs = _legs({**row, "levels": turned}, ())
             references[own.name] = _course(legs, self._begin(own), reach, self.dt)
             levels[own.name] = [in_bar(reach.at(share)) for share in turned]
-        words = "; ".join(f"{n}: {self.told.each(v, 'bar', ', ')}" for n, v in levels.items())
+        words = "; ".join(f"{n}: {self.formatter.each(v, 'bar', ', ')}" for n, v in levels.items())
         facts = self._facts(row, chain) | {"levels": levels, "words": words}
         facts["count"] = "three" if len(shares) == 3 else f"{len(shares)}"
         options: dict[str, Any] = {}
@@ -469,14 +469,14 @@ class Maker:
             return None
         spans = frame.spans.alone
         levels: Any = {n: [in_bar(span.at(s)) for s in row["at"]] for n, span in spans.items()}
-        said = {n: self.told.each(own, "bar") for n, own in levels.items()}
+        said = {n: self.formatter.each(own, "bar") for n, own in levels.items()}
         held = _listed([f"{n} at {words}" for n, words in said.items()])
         if len(set(said.values())) == 1:
             held = next(iter(said.values()))
         valves = sum(len(chain.valves) for chain in self.chains)
         facts = {
             **row,
-            **_rounded_levels(row, stroke, in_mm, self.told),
+            **_rounded_levels(row, stroke, in_mm, self.formatter),
             "lengths": [in_mm(stroke.high), in_mm(stroke.low)],
             "held": held,
             "held_bar": levels if len(levels) > 1 else next(iter(levels.values())),
@@ -513,7 +513,7 @@ class Maker:
         facts |= {
             "period": periods[-1],
             "periods": [round(period, 2) for period in periods],
-            "speeds": f"{self.told.each([1e3 * speed for speed in speeds], 'mm.3g')}/s",
+            "speeds": f"{self.formatter.each([1e3 * speed for speed in speeds], 'mm.3g')}/s",
         }
         options: dict[str, Any] = {}
         if "shut_from" in row:
@@ -535,8 +535,8 @@ class Maker:
             lengths += [(quickest, goal), (1.0 + row["cycles"] * period, goal)]
             levels += [(quickest, low), (1.0, low)]
             levels += [(0.5 * period, high), (0.5 * period, low)] * row["cycles"]
-        told = [in_mm(stroke.at(goal)) for goal in row["goals"]]
-        facts |= {"lengths": told, "goals": self.told.each(told, "mm")}
+        goals = [in_mm(stroke.at(goal)) for goal in row["goals"]]
+        facts |= {"lengths": goals, "goals": self.formatter.each(goals, "mm")}
         facts["period"] = period
         length = _course(lengths, stroke.at(row["goals"][0]), stroke, self.dt)
         return self._driven(row, facts, self._pressures(levels, length.size), length=length)

@@ -2,8 +2,8 @@
 numbers in words; those of sealed chambers, and how all of them follow from recordings.
 
 The levels follow from the rig: the lowest pressure at which its arm leaves the stop and the highest
-that keeps it off the other one. Of several chains (valves and their chambers, or regulators) one is
-moved while the others are held, or all are moved at once, none as another one.
+that keeps it off the opposite stop. Of several chains (valves and their chambers, or regulators)
+one is moved while the others are held, or all are moved at once, none as another one.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _MOST_BLOWN_SAMPLES = 3000
 
 def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experiment]:
     """Experiments of sealed chambers: all filled and left alone; of joined ones, also one alone."""
-    chambers, told = list(rig.tables("chamber")), QuantityFormatter(rig)
+    chambers, formatter = list(rig.tables("chamber")), QuantityFormatter(rig)
     segments = any(line.get("segments") for line in rig.tables("line").values())
     outlets = any(ends["to"] == "ambient" for ends in rig.ports("line").values())
     out = []
@@ -48,7 +48,7 @@ def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experimen
         filled, it, its = ("the chamber", "it", "its") if one else ("all chambers", "them", "their")
         what = f"open {its} outlet" if outlets else f"shut {it} off"
         text = (
-            f"fill {filled} to {told.each([in_bar(pressure)], 'bar')}, {what} and record "
+            f"fill {filled} to {formatter.each([in_bar(pressure)], 'bar')}, {what} and record "
             f"{seconds:g} s from that moment"
         )
         begin = {dotted("muscle_pressure", chamber): pressure for chamber in chambers}
@@ -64,8 +64,8 @@ def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experimen
         except SimulationError:
             continue  # the model does not hold there: nothing to propose to anyone
         text = (
-            f"fill {chamber} to {told.each([in_bar(span.high)], 'bar')} and the rest to "
-            f"{told.each([in_bar(span.low)], 'bar')}, open what lies between and record "
+            f"fill {chamber} to {formatter.each([in_bar(span.high)], 'bar')} and the rest to "
+            f"{formatter.each([in_bar(span.low)], 'bar')}, open what lies between and record "
             f"{seconds:.2g} s from that moment"
         )
         step = max(_LEAST_SAMPLE_TIME, seconds / _MOST_BLOWN_SAMPLES)

@@ -110,7 +110,7 @@ class Part:
     left : tuple of (tuple of str, float)
         The answers that are left and their probabilities: the one that leads first.
     together : bool
-        Whether the first probability is that of its names whatever else acts beside them.
+        Whether the first probability is that of its names whatever else acts with them.
     sure : bool
         Whether nothing else is left and that probability is enough.
     """

@@ -154,8 +154,8 @@ def _changed(compared: Compared, first: Mapping[str, Any], second: Mapping[str, 
             sentences.append(f"probability of {name}: {p or 0.0:.2f} before, now {q or 0.0:.2f}")
     for name, (old, new) in compared.parameters.items():
         if old and new and (apart := _apart(old, new)) >= CLEARLY:
-            now_told = with_unit(f"{new['value']:.4g}", new["unit"] or "")
-            values = f"{old['value']:.4g} before, now {now_told}"
+            latest = with_unit(f"{new['value']:.4g}", new["unit"] or "")
+            values = f"{old['value']:.4g} before, now {latest}"
             sentences.append(f"{name}: {values} ({apart:.1f} standard deviations)")
     for table, what in ((compared.missed, "missed of"), (compared.free_run, "free run of")):
         for name, (size, new_size) in table.items():

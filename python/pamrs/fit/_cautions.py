@@ -157,7 +157,7 @@ def _points(problem: MapProblem, found: Estimate, rows: Mask, labels: Sequence[s
 
 
 def outlying(problem: MapProblem, found: Estimate, rows: Mask) -> list[tuple[int, float]]:
-    """Points that stand apart, one after the other: each is taken away before the next is sought.
+    """Outliers, one after the other: each is taken away before the next is sought.
 
     The error of a point predicted by the others is ``r_i / (1 - h_i)`` with the hat matrix, its
     standard deviation ``sigma / sqrt(1 - h_i)``; sigma is taken from the median of all points,
@@ -176,7 +176,7 @@ def outlying(problem: MapProblem, found: Estimate, rows: Mask) -> list[tuple[int
     -------
     list of (int, float)
         Place among the fitted rows and weighted error of the prediction from the others. Empty with
-        few points to spare, and when more than 5 stand apart: then it is the model that errs.
+        few points to spare, and when there are more than 5: then it is the model that errs.
     """
     prior = found.sigma * problem.information(found.design)
     matrix, residual = np.vstack([found.jacobian, np.diag(prior)]), found.residual.copy()
@@ -189,9 +189,9 @@ def outlying(problem: MapProblem, found: Estimate, rows: Mask) -> list[tuple[int
     while len(apart) <= _MOST_APART and len(residual) - matrix.shape[1] >= _FEW_SPARE:
         basis = _basis(matrix)[: len(residual)]
         left = np.clip(1.0 - np.sum(basis**2, axis=1), 0.0, 1.0)
-        told = left > 1e-6
-        scaled = np.where(told, residual, 0.0) / np.sqrt(np.where(told, left, 1.0))
-        ratio = np.abs(scaled) / np.maximum(apart_by * _scatter(scaled, told, level[places]), least)
+        free = left > 1e-6
+        scaled = np.where(free, residual, 0.0) / np.sqrt(np.where(free, left, 1.0))
+        ratio = np.abs(scaled) / np.maximum(apart_by * _scatter(scaled, free, level[places]), least)
         at = int(np.argmax(ratio))
         if ratio[at] <= 1.0:
             break
@@ -202,11 +202,11 @@ def outlying(problem: MapProblem, found: Estimate, rows: Mask) -> list[tuple[int
     return apart if len(apart) <= _MOST_APART else []
 
 
-def _scatter(scaled: Array, told: Mask, level: Index) -> Array:
+def _scatter(scaled: Array, free: Mask, level: Index) -> Array:
     """Scatter of each point by medians: of all points, or of its own level where that is larger."""
-    spread = np.full(len(scaled), _MAD * float(np.median(np.abs(scaled[told]))))
+    spread = np.full(len(scaled), _MAD * float(np.median(np.abs(scaled[free]))))
     for group in np.unique(level):
-        own = told & (level == group)
+        own = free & (level == group)
         if np.sum(own) >= _FEW_SPARE:
             least = _MAD * float(np.median(np.abs(scaled[own])))
             spread[level == group] = np.maximum(spread[level == group], least)

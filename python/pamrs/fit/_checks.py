@@ -69,8 +69,8 @@ def _slips(
     for read_as in [units[quantity]] if quantity in units else known:
         for unit in known:
             factor = parse_unit(read_as).scale / parse_unit(unit).scale
-            told = quantity in units or known[0] in (unit, read_as)
-            if told and low <= factor <= high and not np.isclose(factor, 1.0):
+            possible = quantity in units or known[0] in (unit, read_as)
+            if possible and low <= factor <= high and not np.isclose(factor, 1.0):
                 found.append((unit, read_as, factor))
     return found
 
@@ -194,7 +194,7 @@ def absolute_pressures(
     """A note if the forces vanish near ambient pressure, as they do when the pressures are
     absolute.
 
-    At the longest lengths, where the rubber is hardly strained, a line through force over pressure
+    At the longest lengths, where the rubber is hardly stretched, a line through force over pressure
     is zero near zero gauge pressure, or at what it takes to lift the bladder against the braid.
 
     Parameters

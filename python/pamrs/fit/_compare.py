@@ -148,8 +148,8 @@ def compare_models(
 ) -> ModelComparison:
     """Fit every model and order, and rank them by leave-one-pressure-out error.
 
-    The ranking asks what a fit is for: pressures that were not measured. AICc and BIC stand beside
-    it, computed with the number of effectively independent points, since residuals of a
+    The ranking asks what a fit is for: pressures that were not measured. AICc and BIC are given
+    with it, computed with the number of effectively independent points, since residuals of a
     quasi-static map are smooth model error and counting every point would favour many unknowns.
     That number is ``n (1 - r_e)/(1 + r_e) (1 - r_P)/(1 + r_P)`` with the correlation of
     neighbouring residuals along contraction and along pressure (negative ones count as 0), of the

@@ -208,8 +208,8 @@ class ForceMap:
         map_ = map_._with_levels(level_tolerance)
         pressure, contraction, force, level, _ = map_.used_rows()
         unit = map_.units.get("pressure", "")
-        told = absolute_pressures(pressure, contraction, force, level, unit)
-        return replace(map_, notes=(*map_.notes, *told))
+        remarks = absolute_pressures(pressure, contraction, force, level, unit)
+        return replace(map_, notes=(*map_.notes, *remarks))
 
     def _with_levels(self, tolerance: float | None) -> ForceMap:
         """The map with its pressure levels found from the used rows."""
@@ -364,8 +364,8 @@ class ForceMap:
         way = np.zeros(len(self), dtype=np.int8)
         way[self.used] = table_ways(contraction, pressure, level)
         note = "directions of motion are those of the rows' order: no column gives them"
-        told = replace(self, direction=way, notes=(*self.notes, note))
-        return told if told.has_loops else self
+        directed = replace(self, direction=way, notes=(*self.notes, note))
+        return directed if directed.has_loops else self
 
     def level_indices(self, pressures: Sequence[float]) -> list[int]:
         """Indices of the levels nearest to some pressures.

@@ -233,7 +233,7 @@ def _check_counts(problem: MapProblem, design: Design, rows: Mask) -> None:
     """Refuse a fit with fewer points than unknowns, by level where the moduli are free at each."""
     n, k = int(rows.sum()), len(design.names)
     # a coefficient with a prior needs no point
-    told = int(np.count_nonzero(problem.expected(design)[1]))
+    with_prior = int(np.count_nonzero(problem.expected(design)[1]))
     # A tolerance is an equation of its own, but what it weighs against the data must come from
     # points to spare.
     extra = len(problem.free)
@@ -243,7 +243,7 @@ def _check_counts(problem: MapProblem, design: Design, rows: Mask) -> None:
     what = f"order {terms}" if design.polynomial else f"the model {problem.blank.model}"
     listed = design.names if k <= 8 else (*design.names[:3], "...", design.names[-1])
     unknowns = [*listed, *(free.name for free in problem.free)]
-    if design.per_level and told < k:
+    if design.per_level and with_prior < k:
         counts = np.bincount(problem.level[rows], minlength=len(problem.levels))
         present = np.flatnonzero(counts).tolist()
         enough = [i for i in present if counts[i] >= terms]
@@ -254,13 +254,13 @@ def _check_counts(problem: MapProblem, design: Design, rows: Mask) -> None:
                 f"moduli free at each level need {terms} points at every level for {what}; fewer "
                 f"at {', '.join(short)}. Levels with enough: {enough or 'none'}"
             )
-    elif design.polynomial and told < k and len(np.unique(problem.level[rows])) < 2:
+    elif design.polynomial and with_prior < k and len(np.unique(problem.level[rows])) < 2:
         only = problem.levels[problem.level[rows][0]] / 1e3
         raise FitError(
             f"one pressure level only ({only:g} kPa): slopes m_k and offsets b_k are collinear; "
             "give two levels at least, or moduli='per_level'"
         )
-    needed = k - told + extra + 1
+    needed = k - with_prior + extra + 1
     if n < needed:
         hint = ", or a known noise" if extra and problem.noise is None else ""
         raise FitError(
@@ -268,7 +268,7 @@ def _check_counts(problem: MapProblem, design: Design, rows: Mask) -> None:
             f"({', '.join(unknowns)}); {needed} points are needed at least{hint}"
         )
     lengths = len(np.unique(np.round(problem.length[rows], 9)))
-    if lengths < terms and told < k:
+    if lengths < terms and with_prior < k:
         raise FitError(
             f"{lengths} different lengths, but {what} has {terms} functions of length; {terms} "
             "different lengths are needed"
@@ -355,9 +355,9 @@ def _search(problem: MapProblem, design: Design, rows: Mask, start: Estimate | N
     """Variable projection: least squares over the geometry, with the coefficients solved exactly
     inside.
 
-    Residuals of the priors, ``(value - nominal)/tolerance``, stand beside data residuals divided by
-    their standard deviation; that is estimated from the residuals, and the search repeated until it
-    stays.
+    Residuals of the priors, ``(value - nominal)/tolerance``, are stacked with data residuals
+    divided by their standard deviation; that is estimated from the residuals, and the search
+    repeated until it stays.
     """
     from scipy.optimize import least_squares
 
@@ -460,8 +460,10 @@ class _Geometry:
         The geometry takes as many degrees of freedom as the data, not the priors, determine.
         """
         slopes = self.jacobian(z, sigma)[: self.n]
-        told = slopes.T @ slopes
-        share = np.linalg.lstsq(told + np.diag((self.prior * self.scale) ** 2), told, rcond=None)[0]
+        information = slopes.T @ slopes
+        share = np.linalg.lstsq(
+            information + np.diag((self.prior * self.scale) ** 2), information, rcond=None
+        )[0]
         rest = residuals[: self.n] * sigma
         freedom = max(self.n - self.k - float(np.trace(share)), 1.0)
         return max(math.sqrt(float(rest @ rest) / freedom), self.least)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pamrs.fit._result import MuscleFit
 
 
-_QUIET, _INK = "#9aa3af", "#374151"
+_GREY, _INK = "#9aa3af", "#374151"
 _MOST_POINTS = 3000
 _FINE = 120  # points of a model line
 _LEAST_ERROR: Final = 1e-7  # drawn for an exact fit: the axis is logarithmic
@@ -119,7 +119,7 @@ def _draw_unused(axes: Axes, data: ForceMap, contraction: Array, size: float) ->
     low, high = float(used.min()), float(used.max())
     inside = off[(contraction[off] >= low - 20) & (contraction[off] <= high + 20)]
     if len(inside):
-        style: dict[str, Any] = {"marker": "x", "s": 0.55 * size, "color": _QUIET, "lw": 0.8}
+        style: dict[str, Any] = {"marker": "x", "s": 0.55 * size, "color": _GREY, "lw": 0.8}
         axes.scatter(contraction[inside], data.force[inside], label="not used", **style)
 
 

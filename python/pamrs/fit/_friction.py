@@ -297,7 +297,7 @@ def fit_friction(data: ForceMap, *, floor: float = 0.01) -> FrictionFit:
     ParameterError
         If ``floor`` is negative or not below 1.
     RecordingError
-        If no direction is known or can be told, or fewer than two pressures have both branches.
+        If no direction is known or can be inferred, or fewer than two pressures have both branches.
     """
     if not (math.isfinite(floor) and 0.0 <= floor < 1.0):
         raise refused("floor", floor, "at least 0 and below 1")
@@ -398,8 +398,8 @@ def _isometric_levels(data: ForceMap, held: list[Index]) -> tuple[list[FrictionL
         If too few pressures have both branches.
     """
     gas, e, pull, _, way = data.used_rows()
-    told = "loops of pressure at held lengths: rising pressure counts as contracting"
-    issues = [*data.issues, told]
+    note = "loops of pressure at held lengths: rising pressure counts as contracting"
+    issues = [*data.issues, note]
     pairs = []
     for part in held:
         found = _pairs(gas[part], pull[part], way[part])

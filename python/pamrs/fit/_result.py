@@ -47,12 +47,12 @@ class MuscleFit(View, FitStatistics):
         axes.figure.colorbar(draw_family(axes, self), ax=axes, label="pressure [kPa]")
 
     def _numbers(self) -> dict[str, str]:
-        told = {
+        values = {
             item.name: with_unit(f"{item.value:.5g} ± {item.stderr:.2g}", item.unit)
             for item in self.params.values()
         }
         error = f"{100 * self.rms_error:.3g} % of the largest force"
-        return {"model": self.model, "points": str(self.ndata), "rms error": error, **told}
+        return {"model": self.model, "points": str(self.ndata), "rms error": error, **values}
 
     @cached_property
     def all_residuals(self) -> Array:

@@ -116,8 +116,8 @@ def fit_muscle(
         least.
     noise : float, optional
         Known standard deviation of the residuals, in N (with ``weights="level"`` as a fraction);
-        None estimates it. Points count as independent beside the priors; where the misfit is the
-        model's, a larger ``noise`` keeps the geometry nearer to nominal.
+        None estimates it. Points count as independent of each other and of the priors; where the
+        misfit is the model's, a larger ``noise`` keeps the geometry nearer to nominal.
     errors : {"level", "plain"}
         ``"plain"`` standard errors take residuals as independent. Residuals of a quasi-static map
         are mostly model error and hang together along a level; then plain ones are too small.
@@ -335,9 +335,11 @@ def _parameters(
     parameters = {}
     expected, information = problem.expected(found.design)
     for i, (name, unit) in enumerate(zip(found.design.names, found.design.units, strict=True)):
-        told = (float(expected[i]), 1.0 / float(information[i])) if information[i] else (None, None)
+        expectation = (
+            (float(expected[i]), 1.0 / float(information[i])) if information[i] else (None, None)
+        )
         parameters[name] = FitParameter(
-            name, float(found.x[i]), spread[i], unit, spread_plain[i], *told
+            name, float(found.x[i]), spread[i], unit, spread_plain[i], *expectation
         )
     for i, free in enumerate(problem.free, start=len(found.x)):
         known = free.tolerance if math.isfinite(free.tolerance) else None

@@ -28,7 +28,7 @@ def held_lengths(contraction: Array, pressure: Array) -> list[Index]:
     Returns
     -------
     list of array
-        Indices of the rows of each; empty where the map is not isometric, since most rows stand at
+        Indices of the rows of each; empty where the map is not isometric, since most rows are at
         other lengths or at held pressures.
     """
     starts = [0]

@@ -1,8 +1,8 @@
 """The muscles of the 2014 dissertation: geometry, moduli, and where each number comes from.
 
 ``pamrs.library.elbow_0625in()`` is a :class:`pamrs.Muscle`; ``pamrs.library.entry("elbow_0625in")``
-also has the origin of each number, the mass and the highest pressure. What is published about the
-muscles stands beside what they give in the reproduction of the dissertation.
+also has the origin of each number, the mass and the highest pressure. The reproduction of the
+dissertation compares what is published about the muscles with what they give.
 """
 
 from __future__ import annotations

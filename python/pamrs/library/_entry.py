@@ -56,7 +56,7 @@ def quantity(item: Mapping[str, Any]) -> Any:
 
 
 def read_entry(text: str) -> Entry:
-    """A muscle from the text of its file, one of those beside this module."""
+    """A muscle from the text of its file, one of those in the folder of this module."""
     document = tomllib.loads(text)
     numbers = {**document["muscle"], **document["properties"]}
     mass = document["properties"].get("mass")

@@ -292,8 +292,8 @@ def _table(problems: list[str], name: Any, table: Any, given: Mapping[str, str])
             if said := "s" if dated else unit or _noted(key, values, table):
                 found.units[key] = said
     if len(found.values) == len(pairs) and len({a.size for a in found.values.values()}) > 1:
-        told = ", ".join(f"{key} {values.size}" for key, values in found.values.items())
-        problems.append(f"recording {name!r}: arrays of one length are needed, not {told}")
+        lengths = ", ".join(f"{key} {values.size}" for key, values in found.values.items())
+        problems.append(f"recording {name!r}: arrays of one length are needed, not {lengths}")
     if not set(found.values) - {"time"}:
         problems.append(f"recording {name!r} has no channel but time")
     return found
@@ -430,12 +430,12 @@ class Case(View):
         return over_time(series)
 
     def _numbers(self) -> dict[str, str]:
-        told = {
+        numbers = {
             f"recording {one.name}": f"{one.role}, {one.duration:.4g} s, {len(one)} samples, "
             f"{len(one.issues)} issues"
             for one in self.recordings
         }
-        return {"case": self.name, "rig": self.rig.name, **told}
+        return {"case": self.name, "rig": self.rig.name, **numbers}
 
     @property
     def fit(self) -> list[Recording]:
@@ -542,7 +542,7 @@ class Case(View):
         file : path-like, optional
             The file that it was read from, for `inputs`.
         """
-        inputs = {name: told for name, told in self.inputs.items() if name != self._rig_file}
+        inputs = {name: digest for name, digest in self.inputs.items() if name != self._rig_file}
         if file is not None:
             inputs[str(file)] = _digest(Path(file))
         return replace(self, rig=rig, inputs=inputs, _rig_file="")
@@ -678,7 +678,7 @@ def _recordings(
     _check_logs(home, entries)
     recordings: list[Recording] = []
     logs: dict[Any, Log] = {}
-    told: set[tuple[str, str, str]] = set()
+    remarked: set[tuple[str, str, str]] = set()
     for index, entry in enumerate(entries):
         label = f"recording[{index}]."
         before = len(problems)
@@ -708,7 +708,7 @@ def _recordings(
                 options |= {"role": role, "name": entry.get("name"), "ambient_pressure": ambient}
                 whole = load_recording(file, **options)
                 parts = [whole.between(entry.get("start"), entry.get("stop"))]
-            said = (replace(_once(part, told), parameters=own) for part in parts)
+            said = (replace(_once(part, remarked), parameters=own) for part in parts)
             recordings += [_on_its_turn(part, rig) for part in said]
         except RecordingError as error:
             problems.append(str(error))
@@ -724,15 +724,15 @@ def _recordings(
     return recordings
 
 
-def _once(recording: Recording, told: set[tuple[str, str, str]]) -> Recording:
+def _once(recording: Recording, remarked: set[tuple[str, str, str]]) -> Recording:
     """Copy of a recording without remarks on its log that an earlier recording of that file has."""
     issues = []
     for issue in recording.issues:
         said = (recording.source, issue.channel, issue.text)
-        if issue.kind != "log" or said not in told:
+        if issue.kind != "log" or said not in remarked:
             issues.append(issue)
         if issue.kind == "log":
-            told.add(said)
+            remarked.add(said)
     return replace(recording, issues=issues)
 
 

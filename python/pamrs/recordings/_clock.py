@@ -559,7 +559,7 @@ def ticks(stamps: Array, others: Sequence[Array] = ()) -> Ticks:
     stamps : (n,) array
         Seconds, NaN where a row has none.
     others : sequence of (n,) arrays
-        What else stands in the rows, by which rows that were written twice are known.
+        What else is in the rows, by which rows that were written twice are known.
 
     Returns
     -------

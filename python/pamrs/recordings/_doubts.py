@@ -225,16 +225,16 @@ def _pressure(
 ) -> Iterator[Suspicion]:
     values = channels[name]
     top = _top_of(values)
-    beside = _fed_by(name, channels, said, rig)
+    source = _fed_by(name, channels, said, rig)
     supply = channel_of(name) == "supply_pressure"
-    reference, what = beside or (_HIGHEST, "what pneumatic muscles take")
-    if beside is None and rig is not None:  # a tank of the rig file that nothing feeds
+    reference, what = source or (_HIGHEST, "what pneumatic muscles take")
+    if source is None and rig is not None:  # a tank of the rig file that nothing feeds
         tanks = [
             float(table.get("initial_pressure", 0.0)) for table in rig.tables("chamber").values()
         ]
         reference = max([reference, *(_OVER * tank for tank in tanks)])
-    least = _RATED[0] if supply and beside else 0.0
-    most = (_RATED[1] if supply else _OVER) if beside else 1.0
+    least = _RATED[0] if supply and source else 0.0
+    most = (_RATED[1] if supply else _OVER) if source else 1.0
     wrong = top > 0.0 and not least <= top / reference <= most
     if wrong and not _agrees(name, top, unit, channels, said):
         likely = _fitting(top, unit, reference, least or _LEAST, most)
@@ -335,8 +335,8 @@ def _temperature(name: str, unit: str, values: Array, rig: Rig | None) -> Iterat
 
 
 def _room(name: str, rig: Rig | None) -> tuple[float, float, float]:
-    """Limits of an angle or a length by the rig file, and what it may go beyond them; without a
-    rig file those of every stand, and nothing [SI].
+    """Limits of an angle or a length by the rig file, and what it may go beyond them; without a rig
+    file those of every bench, and nothing [SI].
     """
     given = limits_of(rig, name)
     low, high = given or (_TURNS if channel_of(name) == "joint_angle" else _LENGTHS)

@@ -129,8 +129,8 @@ def sampled(name: str, values: Array, clock: Ticks, unit: str, hold: bool = Fals
         return Sampled(name, values, time, unit, hold, clock, None, tuple(remarks))
     elif not hold:
         hold = commanded
-        told = "held until the next one" if hold else "taken as sampled at their own times"
-        remarks.append(f"{len(places)} of {len(values)} rows have a value of it: {told}")
+        how = "held until the next one" if hold else "taken as sampled at their own times"
+        remarks.append(f"{len(places)} of {len(values)} rows have a value of it: {how}")
     time = clock.time[places] if hold else spread(clock.time[places])[0]
     return Sampled(name, values[places], time, unit, hold, clock, places, tuple(remarks))
 
@@ -836,7 +836,7 @@ class Clocks:
         return self._made[key]
 
     def _stamps(self, series: Series, clock: Clock) -> tuple[Array, list[Array]]:
-        """Times of a series [s], and what else stands in the rows."""
+        """Times of a series [s], and what else is in the rows."""
         if clock.column is None:
             time = series.time
             if time is None and self.sample_time is not None:

@@ -167,9 +167,9 @@ def admit_arrow(path: Path) -> None:
 
     gate = Gate(path)
     if path.suffix.lower() == ".parquet":
-        told = pyarrow.parquet.read_metadata(path)
-        size = sum(told.row_group(k).total_byte_size for k in range(told.num_row_groups))
-        gate.admit(told.num_rows, told.num_columns, size)
+        metadata = pyarrow.parquet.read_metadata(path)
+        size = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
+        gate.admit(metadata.num_rows, metadata.num_columns, size)
         return
     with pa.memory_map(str(path)) as stream:
         if stream.read(6) != b"ARROW1":

@@ -45,7 +45,7 @@ from pamrs.recordings.logs import (
     understood_unit,
 )
 from pamrs.recordings.mapping import Clock
-from pamrs.recordings.table import stem_of, told_few
+from pamrs.recordings.table import first_few, stem_of
 from pamrs.rig import Rig
 from pamrs.units import parse_unit, same_dimension
 
@@ -171,11 +171,11 @@ _LONG_WORDS: Final = frozenset(
     for word in words
     if len(word) > 2
 )
-"""Words that may stand in a longer one."""
+"""Words that may be part of a longer one."""
 
 
 def channels_of(rig: Rig | None) -> list[str]:
-    """The channels that a stand of this rig can have; all there are without a rig.
+    """The channels that a bench of this rig can have; all there are without a rig.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def channels_of(rig: Rig | None) -> list[str]:
     Returns
     -------
     list of str
-        With the names of its blocks; at the end what is measured beside it, which has none.
+        With the names of its blocks; at the end what is measured outside the rig, which has none.
     """
     if rig is None:
         return [name for name in CHANNELS if name != "time" and name not in _PLAYED]
@@ -224,7 +224,7 @@ def matched(
     matches : list of Match
         In the order of `wanted`.
     left : list of Open
-        Series whose unit is not known, and cannot be told.
+        Series whose unit is not known, and cannot be inferred.
     remarks : list of str
         Units that were assumed, absolute pressures, and commands that this rig has not.
     """
@@ -347,13 +347,13 @@ def _made_gauge(matches: list[Match], rig: Rig | None) -> tuple[list[Match], lis
     """Matches with the ambient pressure to subtract from absolute ones, and remarks on that."""
     recorded = next((each.si() for each in matches if each.channel == "ambient_pressure"), None)
     stated = None if rig is None else ambient_of(rig)
-    found, told = list(matches), []
+    found, remarks = list(matches), []
     for k, each in enumerate(matches):
         if each.absolute and each.channel != "ambient_pressure":
             ambient, said = subtracted(recorded, stated, each.unit)
             found[k] = replace(each, subtracted=ambient)
-            told.append(f"{each.series.name} is an absolute pressure: {said}")
-    return found, told
+            remarks.append(f"{each.series.name} is an absolute pressure: {said}")
+    return found, remarks
 
 
 def _role(series: Series) -> str:
@@ -429,8 +429,8 @@ def _called(series: Series, channel: str, words: set[str]) -> float:
         if channel == "temperature" and elsewhere & words:
             return 0.0
         written = understood_unit(series.unit)
-        told = written is not None and _measures(written, channel)
-        if not place & words or not (what & words or told):
+        fits = written is not None and _measures(written, channel)
+        if not place & words or not (what & words or fits):
             return 0.0
         score += 2.0 if strong & words else 0.0
     return score + (2.0 if named else 0.0)
@@ -625,7 +625,7 @@ class Proposal:
         Parameters
         ----------
         folder : Path
-            Where it is to stand; the logs are named from there.
+            Where it is to be written; the logs are named from there.
         rig : str
             The rig file, from there.
 
@@ -636,7 +636,7 @@ class Proposal:
         """
         if not any(item.matches for item in self.logs):
             names = ", ".join(str(item.log.path) for item in self.logs)
-            series = told_few(
+            series = first_few(
                 [each.name for item in self.logs for each in item.listed], _MOST_UNUSED
             )
             left = "".join(f"\n{each.text}" for item in self.logs for each in item.left)
@@ -807,8 +807,8 @@ def _proposal(
     begun = {*made, *(each.channel for each in left)}
     missing = [name for name in wanted if name not in begun and channel_of(name) not in SLOW]
     if missing and rig is not None:
-        told = ", ".join(_spoken(name, rig) for name in missing)
-        remarks.append(f"not found in this log: {told}")
+        names = ", ".join(_spoken(name, rig) for name in missing)
+        remarks.append(f"not found in this log: {names}")
     stepped = [known[m.channel] for m in matches if not m.hold and m.channel in known]
     stepped += [clock for each in candidates if (clock := clocks.of(each)) is not None]
     split, pieces, short = _split(log, stepped[0] if stepped else None)
@@ -842,8 +842,8 @@ def _unused(names: list[str]) -> list[str]:
     """Remark on series that are no channel, at most one."""
     if not names:
         return []
-    told = told_few(names, _MOST_UNUSED)
-    return [f"not used: {told}; where one is a channel of the rig, name it in case.toml"]
+    few = first_few(names, _MOST_UNUSED)
+    return [f"not used: {few}; where one is a channel of the rig, name it in case.toml"]
 
 
 def _spoken(channel: str, rig: Rig) -> str:
@@ -950,8 +950,8 @@ def _held(times: dict[str, Array]) -> set[str]:
 
 def _rates(times: dict[str, Array]) -> list[str]:
     """Remark on the common grid of channels with different rates; empty for one rate."""
-    told = {k: _rate(time, len(time)) for k, time in times.items() if channel_of(k) not in UNTOLD}
-    rates = {name: rate for name, rate in told.items() if rate > 0.0}
+    every = {k: _rate(time, len(time)) for k, time in times.items() if channel_of(k) not in UNTOLD}
+    rates = {name: rate for name, rate in every.items() if rate > 0.0}
     if not rates or max(rates.values()) < 1.01 * min(rates.values()):
         return []
     fastest = max(rates, key=lambda name: rates[name])

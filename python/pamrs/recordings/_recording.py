@@ -117,12 +117,12 @@ def _rails(data: Array, good: Index) -> list[Fault]:
     for value in (float(data.min()), float(data.max())):
         runs = stretches(data == value)
         share = sum(stop - start for start, stop in runs) / len(data)
-        beside = np.zeros(len(steps), dtype=bool)
+        entered = np.zeros(len(steps), dtype=bool)
         for start, stop in runs:
-            beside[max(0, start - 1) : stop] = True
-        if share > _RAIL_SHARE or beside.all():
+            entered[max(0, start - 1) : stop] = True
+        if share > _RAIL_SHARE or entered.all():
             continue
-        usual = max(float(steps[~beside].max()), float(np.median(steps)))
+        usual = max(float(steps[~entered].max()), float(np.median(steps)))
         if not all(_dropped(data, start, stop, usual) for start, stop in runs):
             continue
         for start, stop in runs:
@@ -146,7 +146,7 @@ def _dropped(data: Array, start: int, stop: int, usual: float) -> bool:
 
 
 def _outliers(data: Array, good: Index) -> list[Fault]:
-    """Spikes of one or two samples that stand off from both sides."""
+    """Spikes of one or two samples that are far from both neighbours."""
     n = len(data)
     if n < _LEAST:
         return []

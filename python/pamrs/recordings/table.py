@@ -158,13 +158,13 @@ class Table:
         matrix = self._matrices.get(decimal)
         return matrix is not None and index in matrix.whole
 
-    def told(self, index: int, rows: Sequence[int]) -> list[str]:
+    def strange_cells(self, index: int, rows: Sequence[int]) -> list[str]:
         """Remark on cells of a column that are no numbers, in a list; empty where there are none:
         ``3 cells are no numbers ('OL', '#N/A'): taken as missing, the first in row 7``.
         """
         if not rows:
             return []
-        some = told_few(dict.fromkeys(repr(self.cell(index, row)[:20]) for row in rows))
+        some = first_few(dict.fromkeys(repr(self.cell(index, row)[:20]) for row in rows))
         count = "1 cell is no number" if len(rows) == 1 else f"{len(rows)} cells are no numbers"
         first = f"{'the first ' * (len(rows) > 1)}in row {self.row_numbers[rows[0]]}"
         return [f"{count} ({some}): taken as missing, {first}"]
@@ -200,7 +200,7 @@ class Table:
         hint = _number_hint(cells[0], thousands, decimal)
         if len(strange) > len(values) // (20 if hint else 5):
             self.numbers(index, label, source, thousands, decimal)  # says which
-        return values, self.told(index, strange)[0]
+        return values, self.strange_cells(index, strange)[0]
 
     def numbers(
         self, index: int, label: str, source: str, thousands: str | None, decimal: str
@@ -297,14 +297,14 @@ def numbers_of_cells(
     return values, strange
 
 
-def told_few(texts: Iterable[str], most: int = 4) -> str:
+def first_few(texts: Iterable[str], most: int = 4) -> str:
     """The first of some texts, parted by commas, and how many more there are."""
     words = list(texts)
     more = f" and {len(words) - most} more" if len(words) > most else ""
     return ", ".join(words[:most]) + more
 
 
-def told_rows(numbers: Sequence[int], what: str) -> list[str]:
+def left_out_rows(numbers: Sequence[int], what: str) -> list[str]:
     """Remark on rows that are left out, in a list; empty where there are none."""
     if not numbers:
         return []
@@ -526,7 +526,7 @@ def same_width(
         (wide, f"rows with more than {width} cells"),
         (again, "rows that repeat the headings, where a recording starts again"),
     ):
-        remarks += told_rows([body.numbers[i] for i in gone], what)
+        remarks += left_out_rows([body.numbers[i] for i in gone], what)
     left = {*again, *wide, *short}
     places = [i for i in range(len(counts)) if i not in left] if left else range(len(counts))
     part = np.searchsorted(again, places).tolist() if again else []
@@ -628,7 +628,7 @@ def thousands_of(thousands: str | Mapping[str, str] | None, name: str) -> str | 
 _PAIRS: Final = tuple((mark, decimal) for mark in ("\t", ";", ",", "|", " ") for decimal in ".,")
 _LINES: Final = 400  # in which the dialect is looked for
 #: Numbers beside others whose decimal mark is the comma: points part thousands.
-BESIDE_COMMAS: Final = re.compile(r"[-+]?(?:[1-9]\d{0,2}(?:\.\d{3})+|\d{1,3})(?:,\d+)?")
+GROUPED_BY_POINTS: Final = re.compile(r"[-+]?(?:[1-9]\d{0,2}(?:\.\d{3})+|\d{1,3})(?:,\d+)?")
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 _POINT = re.compile(r"[+-]?(\d+\.\d*|\.\d+)([eE][+-]?\d+)?")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")  # 1,234: a thousand, or one and a bit
@@ -669,7 +669,7 @@ def is_number(cell: str, decimal: str, thousands: str | None) -> bool:
     """True where a cell is a number in a dialect."""
     cell = cell.replace(thousands, "") if thousands else cell
     if decimal == "," and "." in cell:
-        return BESIDE_COMMAS.fullmatch(cell) is not None
+        return GROUPED_BY_POINTS.fullmatch(cell) is not None
     try:
         float(cell.replace(",", ".") if decimal == "," else cell)
     except ValueError:

@@ -55,8 +55,7 @@ PULLS = ("force", "torque")
 """Blocks of the diagnosis that are what muscles pull."""
 
 UNDER = (*PULLS, "temperature", "flow")
-"""Blocks of the diagnosis whose boxes stand in another block too; their residual stands under
-them."""
+"""Blocks of the diagnosis whose boxes are in another block too; their residual is below them."""
 
 ELSEWHERE = {
     "line": ("valve", "supply", "chamber"),

@@ -22,8 +22,8 @@ def _value(own: dict[str, Any] | None) -> str:
         return "not determined"
     unit, factor = words.display_unit(own["unit"] or "", abs(own["value"]))
     std = None if own["std"] is None else own["std"] * factor
-    told = words.format_uncertain(own["value"] * factor, std, unicode=False)
-    return with_unit(told, unit.replace("°", "deg"))
+    text = words.format_uncertain(own["value"] * factor, std, unicode=False)
+    return with_unit(text, unit.replace("°", "deg"))
 
 
 def tables(found: Compared) -> list[tuple[str, list[tuple[str, str, str]]]]:
@@ -83,8 +83,8 @@ def comparison_text(found: Compared) -> str:
     for title, rows in every:
         lines += ["", title]
         lines += [f"{a:{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in rows]
-    told = found.changed or ["nothing that counts"]
-    return "\n".join([*lines, "", "changed", *(f"  {line}" for line in told)])
+    changes = found.changed or ["nothing that counts"]
+    return "\n".join([*lines, "", "changed", *(f"  {line}" for line in changes)])
 
 
 def comparison_html(found: Compared) -> str:

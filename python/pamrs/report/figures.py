@@ -211,8 +211,8 @@ def free_panels(diagnosis: Findings) -> list[Panel]:
     final = diagnosis.answer.model
     traces = sorted(diagnosis.free_traces, key=missed, reverse=True)
     if not traces:
-        told = telling_trace(diagnosis)
-        return trace_panels(diagnosis, [told]) if told else []
+        first = telling_trace(diagnosis)
+        return trace_panels(diagnosis, [first]) if first else []
     panels = []
     for trace in traces[:MOST_FREE]:
         unit, factor = display_unit(trace.unit, _largest(trace.measured))
@@ -253,9 +253,9 @@ def trace_panels(diagnosis: Findings, traces: Sequence[Trace]) -> list[Panel]:
         # in the colours of the curves above: what is left before is what the refit leaves
         first = ("refitted", "refit") if refitted else ("your model", "before")
         lines = [
-            _line(*told, trace.time, values * factor, width=1.0)
-            for values, told in ((before, first), (after, (final, "after")))
-            if values is not None and _has(values, before if told[1] == "after" else None)
+            _line(*style, trace.time, values * factor, width=1.0)
+            for values, style in ((before, first), (after, (final, "after")))
+            if values is not None and _has(values, before if style[1] == "after" else None)
         ]
         name = f"not explained of {spoken_name(trace.channel)}"
         panels.append(Panel(_quantity(name, unit), lines, _noise(diagnosis, trace) * factor, spans))
@@ -306,7 +306,7 @@ def curves(panels: Sequence[Panel], prefix: str) -> str:
         figure = Figure(figsize=(7.6, 1.85 * len(panels) + 0.35), layout="constrained")
         draw_panels(figure, panels)
         drawn = svg_text(figure, prefix)
-    told = [
+    content = [
         {
             "title": panel.title,
             "noise": panel.noise,
@@ -320,7 +320,7 @@ def curves(panels: Sequence[Panel], prefix: str) -> str:
         for panel in panels
     ]
     # no name in it can end the element
-    text = json.dumps(told, separators=(",", ":")).replace("<", "\\u003c")
+    text = json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
     return f'{drawn}<script type="application/json">{text}</script>'
 
 
@@ -436,7 +436,7 @@ def separating_panels(own: Curves) -> list[Panel]:
 def free_head(diagnosis: Findings) -> str:
     """Heading of the first curves, in a few words."""
     if diagnosis.free_traces:
-        told = diagnosis.free_traces[0]
-        return f"Recording {told.recording}, the whole rig from its commands alone"
+        first = diagnosis.free_traces[0]
+        return f"Recording {first.recording}, the whole rig from its commands alone"
     trace = telling_trace(diagnosis)
     return f"Recording {trace.recording}, the block driven by its neighbours" if trace else ""

@@ -90,19 +90,19 @@ def _verdict(diagnosis: Findings, block: BlockVerdict) -> tuple[str, str, str]:
         return "", "", ""
     lacking = {m.block for m in diagnosis.answer.missed} & {*block.blocks}
     badge = _badge(block.verdict, part.names, settled=part.sure and not lacking)
-    told = f"{words.answer_label(part.words)}, {words.chance_told(part)}"
-    return badge, words.set_label(list(part.names)) if part.names else "–", told
+    leading = f"{words.answer_label(part.words)}, {words.chance_words(part)}"
+    return badge, words.set_label(list(part.names)) if part.names else "–", leading
 
 
 def _missed(diagnosis: Findings, block: BlockMismatch) -> list[str]:
     """Errors of a block, refitted and with what was found, in words."""
-    told = []
+    texts = []
     for stage in ("refit", "after"):
         missed = words.miss(diagnosis, block.channel, stage)
         left = words.left_in(diagnosis, block.block, stage)
-        beside = {"noise": ", noise only", "error": ", inside its usual error"}.get(left, "")
-        told.append(f"{_typeset(str(missed))}{beside}" if missed else "–")
-    return told
+        note = {"noise": ", noise only", "error": ", inside its usual error"}.get(left, "")
+        texts.append(f"{_typeset(str(missed))}{note}" if missed else "–")
+    return texts
 
 
 def _signed(moved: float) -> str:
@@ -121,9 +121,9 @@ def _share(share: float | None) -> str:
 def _intervals(diagnosis: Findings) -> list[str]:
     """Words on the times at which the excess is."""
     spans = [(float(a), float(b)) for a, b in diagnosis.where.intervals]
-    told = next((t for t in diagnosis.traces if t.recording == diagnosis.where.recording), None)
-    if told is not None and sum(b - a for a, b in spans) > THROUGHOUT * float(
-        told.time[-1] - told.time[0]
+    trace = next((t for t in diagnosis.traces if t.recording == diagnosis.where.recording), None)
+    if trace is not None and sum(b - a for a, b in spans) > THROUGHOUT * float(
+        trace.time[-1] - trace.time[0]
     ):
         return ["throughout the recording"]
     return [f"{a:.2f} to {b:.2f} s" for a, b in spans]
@@ -135,7 +135,7 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
     for name, p in diagnosis.parameters.items():
         known, size = p.known or name in wrong, abs(p.moved_sigmas)
         unit, factor = words.display_unit(p.unit, max(abs(p.nominal), abs(p.value)))
-        told = known and math.isfinite(size)
+        shown = known and math.isfinite(size)
         flag = "the rig file is wrong" if name in wrong else ""
         if not flag and not known:
             flag = "not determined by these recordings"
@@ -149,11 +149,11 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
                 ),
                 "name": name,
                 "unit": _unit(unit),
-                "moved": _signed(p.moved_sigmas) if told else "–",
-                "bar": min(1.0, size / 4.0) if told else 0.0,
+                "moved": _signed(p.moved_sigmas) if shown else "–",
+                "bar": min(1.0, size / 4.0) if shown else 0.0,
                 "right": p.moved_sigmas >= 0,
                 "flag": flag,
-                "known": told,
+                "known": shown,
                 "alarm": known and size >= 3,
             }
         )
@@ -211,7 +211,7 @@ _LEFT = {
 
 def _budget(diagnosis: Findings) -> list[tuple[str, list[dict[str, str]]]]:
     """Bars of the terms of each block's budget, each with its interval where the text has it."""
-    blocks = {name: words.told_terms(own) for name, own in words.budgets(diagnosis).items()}
+    blocks = {name: words.reported_terms(own) for name, own in words.budgets(diagnosis).items()}
     every = [v for own in blocks.values() for _, t in own for v in (t.share, *t.interval)]
     low, high = max(-1.0, min([0.0, *every])), min(2.5, max([1.0, *every]))
 
@@ -250,9 +250,9 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
                 continue
             title = f"{closest}{words.label(effect.term)}: {words.label(name)}"
             usual = bench.get(words.label(name)) or words.value_words(effect, name)
-            told = _typeset(usual)
+            on_bench = _typeset(usual)
             value = words.format_uncertain(own.value, own.std)
-            rows.append((title, "", told, value, _span(words.span95(own)), _unit(own.unit)))
+            rows.append((title, "", on_bench, value, _span(words.span95(own)), _unit(own.unit)))
         if vague:
             names = ", ".join(map(words.label, vague))
             title = f"{closest}{words.label(effect.term)}: not determined"
@@ -268,8 +268,8 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
 
 
 def _limits(diagnosis: Findings) -> list[tuple[bool | str, ...]]:
-    """Rows of sizes from which the recordings would have shown effects, and told them apart; first
-    of each, True where the effect is named.
+    """Rows of sizes from which the recordings would have shown effects, and distinguished them;
+    first of each, True where the effect is named.
     """
     return [
         (
@@ -398,11 +398,11 @@ def render(diagnosis: Findings) -> str:
         **pictures,
         **tables,
     )
-    known = len(losses.told)
-    text = page(warnings=[*losses.told, *diagnosis.warnings])
-    if len(losses.told) == known:
+    known = len(losses.sentences)
+    text = page(warnings=[*losses.sentences, *diagnosis.warnings])
+    if len(losses.sentences) == known:
         return text
-    return page(warnings=[*losses.told, *diagnosis.warnings])
+    return page(warnings=[*losses.sentences, *diagnosis.warnings])
 
 
 #: What the template calls each, and what makes it.

@@ -122,7 +122,7 @@ def _draw_channel(
     factor = laboratory_unit(name)[1]
     faint = head == "supply_pressure" and nth == 0 and len(heads) > 1
     colour = _FAINT if faint else _OWN[nth % len(_OWN)]
-    told = {line.get_label() for line in axes.lines}
+    drawn = {line.get_label() for line in axes.lines}
     other = _recorded(name, given)
     if other:
         time, value = given[other]
@@ -132,24 +132,24 @@ def _draw_channel(
             color=COLOURS["measured"],
             lw=2.6,  # seen beside a thin line that follows it
             alpha=0.6,
-            label="_" if "recorded" in told else "recorded",
+            label="_" if "recorded" in drawn else "recorded",
         )
-    beside = (
+    model = (
         nominal
         if nominal is not None
         and name in nominal
         and head not in ("valve_command", "supply_command")
         else None
     )
-    if beside is not None:
-        time, value = decimate(beside.time, factor * beside[name])
+    if model is not None:
+        time, value = decimate(model.time, factor * model[name])
         axes.plot(
             time,
             value,
             "--",
             color=colour if len(names) > 1 else COLOURS["before"],
             lw=1.1,
-            label="_" if "rig file" in told else "rig file",
+            label="_" if "rig file" in drawn else "rig file",
         )
     time, value = decimate(result.time, factor * result[name])
     axes.plot(
@@ -158,7 +158,7 @@ def _draw_channel(
         {"supply_command": "--", "line_pressure": ":"}.get(head, "-"),
         color=colour,
         lw=1.3,
-        label=f"{label} {'simulated' if beside is None else 'model'}".strip(),
+        label=f"{label} {'simulated' if model is None else 'model'}".strip(),
     )
 
 
@@ -254,8 +254,8 @@ class _Muscles:
 
     def draw(self, row: int, base: Array, along: Array, side: float) -> Array:
         """Draw the muscles from beyond a joint to it, on one side of the link; return their end."""
-        beside = side * 1.2 * float(self.widths.max()) * np.array([along[1], -along[0]])
-        far = base + 1.1 * self.rest * along + beside
+        offset = side * 1.2 * float(self.widths.max()) * np.array([along[1], -along[0]])
+        far = base + 1.1 * self.rest * along + offset
         near = far - self.rest * (1.0 - float(self.contraction[row])) * along
         self.line.set_data([far[0], near[0]], [far[1], near[1]])
         self.line.set_linewidth(self.scale * float(self.widths[row]))

@@ -58,9 +58,9 @@ def one_page_pdf(diagnosis: Findings) -> bytes:
         heights = [3.0, 1.4, 4.6, 2.3]
         parts = figure.subfigures(4, 1, height_ratios=heights, squeeze=False)[:, 0]
         top, chain, curves, bars = parts
-        told = [f"{value} – {what}" for value, what in story.facts(diagnosis)]
-        told += [*story.to_do(diagnosis), story.next_to_do(diagnosis)]
-        lines = [textwrap.fill(text, 100) for text in filter(None, told)]
+        texts = [f"{value} – {what}" for value, what in story.facts(diagnosis)]
+        texts += [*story.to_do(diagnosis), story.next_to_do(diagnosis)]
+        lines = [textwrap.fill(text, 100) for text in filter(None, texts)]
         title = textwrap.fill(story.title(diagnosis), 60)
         style: dict[str, Any] = {"ha": "left", "va": "top"}
         top.text(0.05, 0.93, title, size=15, fontweight="bold", **style)
@@ -99,7 +99,7 @@ def _draw_rivals(part: Any, diagnosis: Findings) -> None:
     colours = [COLOURS["after" if row.named else "quiet"] for row in rows]
     axes.barh(places, [row.probability for row in rows], color=colours, height=0.62)
     for place, row in zip(places, rows, strict=True):
-        axes.text(row.probability + 0.015, place, row.told, va="center", fontsize="small")
+        axes.text(row.probability + 0.015, place, row.chance, va="center", fontsize="small")
     axes.set_yticks(places, [textwrap.shorten(row.name, 34, placeholder=" …") for row in rows])
     axes.set_xlim(0.0, 1.16)
     axes.set_xticks([0.0, 0.5, 1.0])

@@ -16,8 +16,8 @@ LONGEST = 24
 """Words of a title at most."""
 MOST_RIVALS = 7
 """Explanations that are ranked on the first screen."""
-LEAST_TOLD = 0.05
-"""Probability from which an explanation stands in the title."""
+LEAST_SHOWN = 0.05
+"""Probability from which an explanation is in the title."""
 AS_MUCH = 0.03
 """Difference of two shares of a mismatch below which both explain as much."""
 
@@ -28,7 +28,7 @@ class Rival(NamedTuple):
     """
 
     name: str
-    told: str
+    chance: str
     probability: float
     named: bool
     why: str
@@ -46,8 +46,8 @@ def title(diagnosis: Findings) -> str:
         names = [words.spoken_name(n) for own in diagnosis.misread for n in own.channels]
         first = diagnosis.misread[0]
         verb = "are" if len(names) > 1 else "is"
-        told = f"{_listed(names, 2, 'and')} {verb} likely {first.likely}, not {first.said}"
-        return f"{told[:1].upper()}{told[1:]}: no physics was judged"
+        sentence = f"{_listed(names, 2, 'and')} {verb} likely {first.likely}, not {first.said}"
+        return f"{sentence[:1].upper()}{sentence[1:]}: no physics was judged"
     parts = diagnosis.answer.parts
     if diagnosis.answer.missed and not diagnosis.answer.named:
         return words.missed_sentence(diagnosis, 1)
@@ -64,7 +64,7 @@ def title(diagnosis: Findings) -> str:
     end = f"; something else {acts} the {others}" if others else ""
     end += "".join(f", with {law.name} = {law.other}" for law in diagnosis.laws[:1])
     every = (_phrase(diagnosis, parts[0], most) + end for most in (3, 2, 1))
-    short = (told for told in every if len(told.split()) <= LONGEST)
+    short = (sentence for sentence in every if len(sentence.split()) <= LONGEST)
     return next(short, _phrase(diagnosis, parts[0], 0) + end)
 
 
@@ -89,10 +89,10 @@ def headline(diagnosis: Findings) -> str:
     together = _together(parts, doubt=bool(missed))
     phrases = [together] if together else phrases
     still = [missed] * bool(missed)
-    told = [*phrases, *still] if diagnosis.answer.named else [*still, *phrases]
-    told = told or [title(diagnosis)]
+    sentences = [*phrases, *still] if diagnosis.answer.named else [*still, *phrases]
+    sentences = sentences or [title(diagnosis)]
     rest = [*words.within_error(diagnosis), *words.not_judged_words(diagnosis)]
-    return ". ".join([*first, *told[:-1], "; ".join([told[-1], *rest])])
+    return ". ".join([*first, *sentences[:-1], "; ".join([sentences[-1], *rest])])
 
 
 def _together(parts: Sequence[Part], *, doubt: bool) -> str:
@@ -119,7 +119,7 @@ def _place(part: Part) -> str:
 
 def _healthy(diagnosis: Findings) -> str:
     """The title where no answer that is left has anything missing."""
-    place = words.judged_place(diagnosis) + words.beside_held(diagnosis)
+    place = words.judged_place(diagnosis) + words.held_words(diagnosis)
     how = words.down_to(diagnosis)
     if diagnosis.answer.verdict == "parameters":
         by = "values inside their tolerances explain the difference"
@@ -129,10 +129,10 @@ def _healthy(diagnosis: Findings) -> str:
 
 def _listed(names: Sequence[str], most: int, last: str) -> str:
     """Some of several names in a row: ``a, b or 3 more``."""
-    told = list(names[:most])
+    shown = list(names[:most])
     if len(names) > most:
-        told.append(f"{len(names) - most} more")
-    return words.listed(told, last)
+        shown.append(f"{len(names) - most} more")
+    return words.listed(shown, last)
 
 
 def _phrase(diagnosis: Findings, part: Part, most: int) -> str:
@@ -147,13 +147,15 @@ def _phrase(diagnosis: Findings, part: Part, most: int) -> str:
     if left == [UNLISTED] and part.sure:
         acts = f"Something acts in the {_place(part)} that no effect of the catalogue explains"
         return _with_chance(acts, part)
-    told = {h: p for h, (_, p) in zip(left, part.left, strict=True)}
+    chances = {h: p for h, (_, p) in zip(left, part.left, strict=True)}
     if len(left) == 1:  # rivals of which none is probable enough for a set
         ranked = words.ranked_probabilities(part.group.probabilities, None)
-        told |= {Hypothesis.parse(k): p for k, p in ranked if p >= LEAST_TOLD and not part.names}
+        chances |= {
+            Hypothesis.parse(k): p for k, p in ranked if p >= LEAST_SHOWN and not part.names
+        }
     named = [
         _with_chance(words.set_label(h.words), part if h == left[0] else chance)
-        for h, chance in told.items()
+        for h, chance in chances.items()
         if h not in (NONE, PARAMETERS)
     ]
     head = _head(_place(part), left, doubt=doubt)
@@ -173,8 +175,10 @@ def _missing_input(diagnosis: Findings, part: Part) -> str:
 def _with_chance(text: str, chance: Part | float) -> str:
     """Something with its probability behind it, where that is known."""
     known = chance.probability if isinstance(chance, Part) else chance
-    told = words.chance_told(chance) if isinstance(chance, Part) else ""
-    return f"{text} ({told or words.format_probability(known)})" if words.is_number(known) else text
+    shown = words.chance_words(chance) if isinstance(chance, Part) else ""
+    return (
+        f"{text} ({shown or words.format_probability(known)})" if words.is_number(known) else text
+    )
 
 
 def _head(place: str, left: Sequence[Hypothesis], *, doubt: bool) -> str:
@@ -219,12 +223,12 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
         several = len(diagnosis.answer.parts or answer.quiet) > 1
         at = words.blocks_label(part.group) if part in answer.quiet else _place(part)
         label = words.answer_label(part.words)
-        what = f"probability {words.chance_told(part)}" + f" in the {at}" * several
+        what = f"probability {words.chance_words(part)}" + f" in the {at}" * several
         found.append((label, what))
     named = [e for e in diagnosis.effects if e.term in answer.named]
     for effect in sorted(named, key=lambda e: bool(parts) and e.term not in parts[0].names):
-        told = bench_value(effect)[:1]
-        found += [(value, f"{words.label(effect.term)}: {name}") for name, value in told]
+        sizes = bench_value(effect)[:1]
+        found += [(value, f"{words.label(effect.term)}: {name}") for name, value in sizes]
     channel = next((m.channel for p in parts for m in p.group.mismatch if m.block == p.block), None)
     channel = channel or diagnosis.where.channel or words.worst_channel(diagnosis)
     last = None if answer.missed else words.miss(diagnosis, channel, "after")
@@ -378,10 +382,10 @@ def _why(diagnosis: Findings, part: Part | None, key: str) -> str:
     taken = _taken(diagnosis, hypothesis.words)
     if taken is None or part is None:
         return ""
-    told = f"takes {words.format_share(max(0.0, taken))} of what the refit leaves"
+    takes = f"takes {words.format_share(max(0.0, taken))} of what the refit leaves"
     best = _taken(diagnosis, part.names)
     if words.is_named(part, key) or best is None:
-        return told
+        return takes
     if set(hypothesis.words) > set(part.names):
-        return f"{told}: no more than without the addition" if taken < best + AS_MUCH else told
-    return f"{told} as well, with rarer values or names" if taken > best - AS_MUCH else told
+        return f"{takes}: no more than without the addition" if taken < best + AS_MUCH else takes
+    return f"{takes} as well, with rarer values or names" if taken > best - AS_MUCH else takes

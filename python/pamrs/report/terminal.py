@@ -38,9 +38,9 @@ def summary(diagnosis: Findings) -> str:
         for name, own in effect.parameters.items():
             if name not in vague:
                 value = words.format_uncertain(own.value, own.std, unicode=False)
-                told = with_unit(f"  {name} = {value}", own.unit)
+                line = with_unit(f"  {name} = {value}", own.unit)
                 usual = bench.get(words.label(name)) or words.value_words(effect, name)
-                lines.append(f"{told}: {usual}" if usual else told)
+                lines.append(f"{line}: {usual}" if usual else line)
         if vague:
             names = f"  these recordings do not determine {', '.join(vague)}"
             lines += textwrap.wrap(names, 96, subsequent_indent="    ")
@@ -96,15 +96,15 @@ def _free_run(diagnosis: Findings) -> list[str]:
     """The whole rig from its commands alone, one line for each of the first recordings."""
     lines = []
     for run in (diagnosis.free_run or [])[:2]:
-        told = []
+        errors = []
         for channel, error in run.channels.items():
             unit, factor = words.display_unit(error.unit, error.before)
             before, after = (
                 words.format_number(v * factor, unicode=False) for v in (error.before, error.after)
             )
             to = f" to {after}" if diagnosis.answer.model != YOURS else ""
-            told.append(f"{channel} {before}{to} {unit}")
-        text = f"Whole rig from its commands alone, {run.recording}: {'; '.join(told)}"
+            errors.append(f"{channel} {before}{to} {unit}")
+        text = f"Whole rig from its commands alone, {run.recording}: {'; '.join(errors)}"
         lines += _wrapped(text.translate(_ASCII))
     return lines
 
@@ -113,8 +113,8 @@ def _budget(diagnosis: Findings) -> list[str]:
     """Lines on what takes the mismatch of each block."""
     lines = []
     for block, sentence in words.budget_sentences(diagnosis):
-        told = f"Budget of the {words.spoken_name(block)}: {sentence}".translate(_ASCII)
-        lines += _wrapped(told)
+        text = f"Budget of the {words.spoken_name(block)}: {sentence}".translate(_ASCII)
+        lines += _wrapped(text)
     # where parameters alone take all there is nothing to read wrongly
     shares = [t for t in diagnosis.budget if t.kind != "unexplained"]
     plain = all(t.kind == "parameters" and 0.0 <= t.share <= 1.0 for t in shares)
@@ -129,11 +129,11 @@ def _next(diagnosis: Findings) -> list[str]:
     if not own.text:
         return []
     lines = ["", *_wrapped(f"Next experiment: {own.text}")]
-    for pair, text in words.told_pairs(diagnosis):
+    for pair, text in words.pair_texts(diagnosis):
         if own.pairs[0].between[0] in pair.between:
             between = " or ".join(words.hypothesis_label(name) for name in pair.between)
-            told = f"{between}? {text}"
-            lines += textwrap.wrap(told, 96, initial_indent="  ", subsequent_indent="    ")
+            question = f"{between}? {text}"
+            lines += textwrap.wrap(question, 96, initial_indent="  ", subsequent_indent="    ")
     return lines
 
 

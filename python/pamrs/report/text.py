@@ -45,10 +45,10 @@ _LABELS = {
 }
 
 TELLING = 0.25
-"""Distance below nothing or above everything within which a share is told as a number."""
+"""Distance below nothing or above everything within which a share is written as a number."""
 
 FARTHEST = 3.0
-"""Largest end of a share's interval that is told as a number."""
+"""Largest end of a share's interval that is written as a number."""
 
 BUDGET_NOTE = (
     "Shares are of the variance that the nominal model leaves beyond the noise; all values are "
@@ -267,8 +267,8 @@ def value_words(effect: EffectFound, name: str) -> str:
     if own is None or own.role != "choice":
         unit, factor = display_unit(found.unit, found.value)
         return "" if unit == found.unit else f"{format_number(factor * found.value)} {unit}"
-    told: dict[str, str] = dict(re.findall(r"(\d)(?: \([^)]*\))?: ([^,]+)", own.meaning))
-    return told.get(f"{found.value:.0f}", "")
+    meanings: dict[str, str] = dict(re.findall(r"(\d)(?: \([^)]*\))?: ([^,]+)", own.meaning))
+    return meanings.get(f"{found.value:.0f}", "")
 
 
 def span95(entry: EffectParameterFound) -> tuple[float, float] | None:
@@ -417,7 +417,7 @@ def spoken_block(name: str) -> str:
     return f"{label(kind)} block of {label(group)}" if group else f"{label(kind)} block"
 
 
-def told_pairs(diagnosis: Findings) -> list[tuple[PairExperiment, str]]:
+def pair_texts(diagnosis: Findings) -> list[tuple[PairExperiment, str]]:
     """Texts on what separates each two hypotheses that are left open; an instruction that was given
     before is not given again.
     """
@@ -429,11 +429,11 @@ def told_pairs(diagnosis: Findings) -> list[tuple[PairExperiment, str]]:
             continue
         shared = max((_shared(pair.text, text) for text in before), default=0)
         first = next(text for text in before if _shared(pair.text, text) == shared)
-        told = pair.text
+        shown = pair.text
         if shared:
             rest = pair.text[shared:].lstrip(" .;:")
-            told = f"{before[first]} {rest[:1].upper()}{rest[1:]}".strip()
-        found.append((pair, told))
+            shown = f"{before[first]} {rest[:1].upper()}{rest[1:]}".strip()
+        found.append((pair, shown))
         between = " or ".join(hypothesis_label(name) for name in pair.between)
         before.setdefault(pair.text, f"The experiment for {between}.")
     return found
@@ -474,20 +474,20 @@ def missed_sentence(diagnosis: Findings, most: int | None = None) -> str:
     diagnosis : Findings
         What was found.
     most : int, optional
-        Channels that are told at most, then without their noise levels.
+        Channels that are named at most, then without their noise levels.
     """
-    answer, told = diagnosis.answer, dict[str, str]()
+    answer, by_channel = diagnosis.answer, dict[str, str]()
     for own in answer.missed:
         times = f"{format_number(own.noises, 2, unicode=False)} noise levels"
         if answer.model != YOURS and own.block is None and is_number(own.before):
             times += f"; {YOURS}: {sized(own.before, own.unit)}"
         place = f"in the {spoken_name(own.block)}" if own.block else "in the whole rig"
         size = sized(own.size, own.unit) + (f" ({times})" if most is None else "")
-        told.setdefault(own.channel, f"{spoken_name(own.channel)} by {size} {place}")
-    if not told:
+        by_channel.setdefault(own.channel, f"{spoken_name(own.channel)} by {size} {place}")
+    if not by_channel:
         return ""
     what = "what else is missing" if answer.named else "what is missing"
-    said = listed(list(told.values())[:most])
+    said = listed(list(by_channel.values())[:most])
     return capital(f"{with_article(answer.model)} still misses {said}; {what} was not found")
 
 
@@ -525,7 +525,7 @@ def within_error(diagnosis: Findings) -> list[str]:
     where other groups lack something: ``the arm fits to within its usual error (joint angle 1.2 deg
     of 1.9 deg)``.
     """
-    told = []
+    sentences = []
     for part in diagnosis.answer.quiet if diagnosis.answer.parts else ():
         for own in part.group.mismatch:
             found = miss(diagnosis, own.channel, "after")
@@ -533,10 +533,10 @@ def within_error(diagnosis: Findings) -> list[str]:
                 usual = (
                     f"{spoken_name(own.channel)} {found.size} of {sized(own.model_error, own.unit)}"
                 )
-                told.append(
+                sentences.append(
                     f"the {spoken_name(own.block)} fits to within its usual error ({usual})"
                 )
-    return told
+    return sentences
 
 
 def not_judged_words(diagnosis: Findings) -> list[str]:
@@ -547,11 +547,11 @@ def not_judged_words(diagnosis: Findings) -> list[str]:
     for block in diagnosis.not_judged:
         own = block.covers or blocks_label(block)
         reasons.setdefault(block.reason, []).append(own)
-    told = [f"{' and '.join(names)} ({why})" for why, names in reasons.items()]
-    return [f"not judged: {'; '.join(told)}"] if told else []
+    texts = [f"{' and '.join(names)} ({why})" for why, names in reasons.items()]
+    return [f"not judged: {'; '.join(texts)}"] if texts else []
 
 
-def chance_told(part: Part) -> str:
+def chance_words(part: Part) -> str:
     """Probability of what leads a group: ``0.93``, or ``0.60, alone or with others`` of names that
     its sets have in common.
     """
@@ -571,7 +571,7 @@ def name_chance(diagnosis: Findings, name: str) -> str:
         )
     for part in naming:
         text = format_probability(part.with_name(name))
-        return text if text == chance_told(part) else f"{text}, alone or with others"
+        return text if text == chance_words(part) else f"{text}, alone or with others"
     return ""
 
 
@@ -651,15 +651,15 @@ def mended_sentence(diagnosis: Findings, by: str) -> str:
     str
         Empty where the errors are not known, and where nothing is mended.
     """
-    answer, told = diagnosis.answer, list[str]()
+    answer, changes = diagnosis.answer, list[str]()
     mended = {m.block: m.channel for b in diagnosis.judged for m in b.mismatch}
     blocks = [p.block for p in answer.parts if p.names or answer.model == MENDED]
     own = [mended[block] for block in blocks if block in mended]
     for channel in own or [diagnosis.where.channel or ""]:
         before, after = (miss(diagnosis, channel, stage) for stage in ("refit", "after"))
         if before and after and after.noises < before.noises:
-            told.append(f"{spoken_name(channel)} by {after} instead of {before}")
-    return f"{by} the model misses {' and '.join(told)}" if told else ""
+            changes.append(f"{spoken_name(channel)} by {after} instead of {before}")
+    return f"{by} the model misses {' and '.join(changes)}" if changes else ""
 
 
 def unsettled_sentence(diagnosis: Findings) -> str:
@@ -667,19 +667,19 @@ def unsettled_sentence(diagnosis: Findings) -> str:
     answer = diagnosis.answer
     open_ = [part for part in answer.parts if len(part.left) > 1]
     several = len(answer.parts) > 1
-    told = []
+    reasons = []
     if answer.missed:
-        told.append(f"{with_article(answer.model)} misses more than noise and its error explain")
+        reasons.append(f"{with_article(answer.model)} misses more than noise and its error explain")
     for part in open_:
         place = f" in the {spoken_name(part.block or 'rig')}" if several else ""
-        told.append(f"these recordings cannot tell {told_apart(part)}{place}")
+        reasons.append(f"these recordings cannot tell {told_apart(part)}{place}")
     for part in answer.parts:
         if part not in open_ and not part.sure:
             what = set_label(list(part.words))
-            told.append(
-                f"{what} has {chance_told(part)}, and more than {diagnosis.settled} is needed"
+            reasons.append(
+                f"{what} has {chance_words(part)}, and more than {diagnosis.settled} is needed"
             )
-    return f"It is not settled: {'; '.join(told)}." if told else ""
+    return f"It is not settled: {'; '.join(reasons)}." if reasons else ""
 
 
 def told_apart(part: Part) -> str:
@@ -687,10 +687,10 @@ def told_apart(part: Part) -> str:
     ``a (0.50), b (0.30) and c (0.20) apart``.
     """
     names = {name for words, _ in part.left for name in words}
-    told = [_answer([_spread(n, names) for n in own], chance) for own, chance in part.left]
-    if len(told) == 2:
-        return f"{told[0]} from {told[1]}"
-    return f"{', '.join(told[:-1])} and {told[-1]} apart"
+    answers = [_answer([_spread(n, names) for n in own], chance) for own, chance in part.left]
+    if len(answers) == 2:
+        return f"{answers[0]} from {answers[1]}"
+    return f"{', '.join(answers[:-1])} and {answers[-1]} apart"
 
 
 def _spread(name: str, others: Collection[str]) -> str:
@@ -753,7 +753,7 @@ def judged_place(diagnosis: Findings) -> str:
     return f" in the {' and '.join(blocks_label(block) for block in diagnosis.judged)}"
 
 
-def beside_held(diagnosis: Findings) -> str:
+def held_words(diagnosis: Findings) -> str:
     """The effects that the model had before: `` in addition to the leak that the model holds``."""
     ids = [term.id for term in diagnosis.budget if term.kind == "held"]
     ids += [effect.id for name in diagnosis.parameters if (effect := effect_of(name))]
@@ -824,8 +824,8 @@ def budget_sentence(terms: Sequence[BudgetTerm], left: str = "") -> str:
     """Sentence on the budget of one block; its rest is called what it is, where that is known
     (``noise``, ``error``, ``more``).
     """
-    *before, (_, last) = told_terms(terms)
-    told = [
+    *before, (_, last) = reported_terms(terms)
+    shares = [
         f"{name} {format_share(term.share)} ({format_interval(term.interval)})"
         for name, term in before
         if _tellable(term.share)
@@ -834,10 +834,10 @@ def budget_sentence(terms: Sequence[BudgetTerm], left: str = "") -> str:
     if not _tellable(last.share):
         share = "more is unexplained than with the nominal model"
     left = left or ("more" if last.noises > 0.0 else "noise")
-    return "; ".join([*told, _LEFT.get(left, share)]) + "."
+    return "; ".join([*shares, _LEFT.get(left, share)]) + "."
 
 
-def told_terms(terms: Sequence[BudgetTerm]) -> list[tuple[str, BudgetTerm]]:
+def reported_terms(terms: Sequence[BudgetTerm]) -> list[tuple[str, BudgetTerm]]:
     """Terms of a block's budget that are reported, each with its name: as they are, or together
     where one takes back what another one spoils, so that shares of single ones say nothing.
     """
@@ -881,7 +881,7 @@ def format_interval(interval: Sequence[float]) -> str:
 
 
 _CLEARLY_WORSE = 1.1  # ratio of two errors that is no accident of the noise
-_TOLD_LOGS = 3
+_MOST_LOGS = 3
 """Recordings of which a summary says what was left out."""
 
 
@@ -898,7 +898,7 @@ def left_out_sentence(diagnosis: Findings) -> str:
     str
         Empty where all of them was used as it was written.
     """
-    told = []
+    lines = []
     for own in diagnosis.data:
         counts: dict[int, list[str]] = {}
         for name, share in own.masked.items():
@@ -909,12 +909,12 @@ def left_out_sentence(diagnosis: Findings) -> str:
             for count, names in counts.items()
         ]
         if parts:
-            told.append(f"{own.recording}: {'; '.join(parts)}")
-    if not told:
+            lines.append(f"{own.recording}: {'; '.join(parts)}")
+    if not lines:
         return ""
-    more = len(told) - _TOLD_LOGS
+    more = len(lines) - _MOST_LOGS
     rest = f". The same of {more} more recordings" if more > 0 else ""
-    return f"As read: {'. '.join(told[:_TOLD_LOGS])}{rest}"
+    return f"As read: {'. '.join(lines[:_MOST_LOGS])}{rest}"
 
 
 def data_sentence(diagnosis: Findings) -> str:
@@ -958,5 +958,5 @@ def data_sentence(diagnosis: Findings) -> str:
     reasons: dict[str, list[str]] = {}
     for name, why in unused.items():
         reasons.setdefault(why, []).append(name)
-    told = "; ".join(f"{', '.join(names)} ({why})" for why, names in reasons.items())
-    return f"{text}; recorded but not used: {told}"
+    why_unused = "; ".join(f"{', '.join(names)} ({why})" for why, names in reasons.items())
+    return f"{text}; recorded but not used: {why_unused}"

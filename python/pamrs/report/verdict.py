@@ -98,10 +98,10 @@ def _effects(diagnosis: Findings, case: Case) -> str:
     found = [e for e in diagnosis.effects if e.term in diagnosis.answer.named]
     if not found:
         return ""
-    told = [
+    effects = [
         f"{effect_name(e)} ({e.id}, probability {name_chance(diagnosis, e.term)})" for e in found
     ]
-    text = f"{_opening(diagnosis, found, 'the model leaves out')}: {listed(told)}."
+    text = f"{_opening(diagnosis, found, 'the model leaves out')}: {listed(effects)}."
     leads = diagnosis.answer.parts[0]
     if leads.group.effects:
         text += f" {diagnosis.where.text}"
@@ -117,8 +117,8 @@ def _effects(diagnosis: Findings, case: Case) -> str:
 
 def _closed(diagnosis: Findings, by: str) -> str:
     """Sentence on what the model misses then; empty where that is not known."""
-    told = mended_sentence(diagnosis, by)
-    return f" {told}, on {diagnosis.proof}." if told else ""
+    sentence = mended_sentence(diagnosis, by)
+    return f" {sentence}, on {diagnosis.proof}." if sentence else ""
 
 
 def _mistaken(diagnosis: Findings) -> str:
@@ -126,25 +126,25 @@ def _mistaken(diagnosis: Findings) -> str:
     found = diagnosis.wrong_parameters
     if not found:
         return ""
-    told = []
+    sentences = []
     # the error is that of the model with everything that was found
-    beside = " with all that was found" if len(diagnosis.answer.named) > 1 else ""
+    addition = " with all that was found" if len(diagnosis.answer.named) > 1 else ""
     for wrong in found:
         mended = {
             channel: e for channel, e in wrong.held_out.items() if e.after < _MENDED * e.refit
         }
-        told_by = mended or wrong.held_out
+        errors_of = mended or wrong.held_out
         errors = "; ".join(
-            f"the {spoken_name(channel)} is then missed{beside} by "
+            f"the {spoken_name(channel)} is then missed{addition} by "
             f"{_instead(e.after, e.refit, unit_of(channel))}, which values inside the tolerances "
             "leave"
-            for channel, e in told_by.items()
+            for channel, e in errors_of.items()
         )
-        told.append(
+        sentences.append(
             f"{sentence_of(wrong)} (probability {name_chance(diagnosis, wrong.name)}, "
             f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {diagnosis.proof} {errors}."
         )
-    return f"{_opening(diagnosis, found, 'the rig file is wrong')}: " + " ".join(told)
+    return f"{_opening(diagnosis, found, 'the rig file is wrong')}: " + " ".join(sentences)
 
 
 def _instead(value: float, before: float, unit: str) -> str:

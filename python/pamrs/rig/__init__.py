@@ -1,8 +1,8 @@
 """The description of a rig: blocks with parameters, the file that holds it, muscle and joint.
 
 :class:`Rig` is what everything else works with; :func:`load_rig` reads one from a TOML file.
-:class:`Muscle` and :class:`Joint` also stand alone. :mod:`pamrs.rig.schema` lists the blocks and
-keys that a rig file may have, :mod:`pamrs.rig.muscle_models` lists the force models.
+:class:`Muscle` and :class:`Joint` can also be used alone. :mod:`pamrs.rig.schema` lists the blocks
+and keys that a rig file may have, :mod:`pamrs.rig.muscle_models` lists the force models.
 :class:`Reader` and :func:`muscle_problems` read and check the blocks of other files as those of a
 rig.
 """

@@ -230,17 +230,17 @@ def _exact(parameters: Mapping[str, Parameter], units: Units) -> list[str]:
     """Caution about measured values without a tolerance, which a diagnosis takes as exact."""
     if not any(known.tol for known in parameters.values()):
         return ["no value has a tolerance (tol): a diagnosis would take all of them as exact"]
-    told = []
+    inexact = []
     for name, known in parameters.items():
         block, _, key = split_name(name)
         share = _MEASURED.get((block, key))
         if share and known.value and not known.tol:
             tol = units.said(name, known.unit, share * abs(known.value), digits=".2g")
-            told.append(f"{name} (tol = {tol})")
-    if not told:
+            inexact.append(f"{name} (tol = {tol})")
+    if not inexact:
         return []
     return [
-        f"known exactly, as no laboratory knows it: {', '.join(told)} would be usual; what a "
+        f"known exactly, as no laboratory knows it: {', '.join(inexact)} would be usual; what a "
         "diagnosis may not move it explains with effects"
     ]
 
@@ -333,13 +333,13 @@ def _late(label: str, valve: Mapping[str, Any], units: Units) -> list[str]:
     def said(seconds: float, key: str) -> str:
         return units.said(f"{label}.{key}", "s", seconds)
 
-    told = f"the period of {label}.carrier_frequency ({said(period, 'opening_delay')}) or longer"
+    late = f"the period of {label}.carrier_frequency ({said(period, 'opening_delay')}) or longer"
     follows = {
         "opening_delay": "no pulse moves it, only a duty of 1 does",
         "closing_delay": "no gap lets it return, only a duty of 0 does",
     }
     found = [
-        f"{label}.{key} = {said(delay, key)} is {told}: {follows[key]}"
+        f"{label}.{key} = {said(delay, key)} is {late}: {follows[key]}"
         for key, delay in delays.items()
         if delay >= period
     ]
@@ -347,6 +347,6 @@ def _late(label: str, valve: Mapping[str, Any], units: Units) -> list[str]:
         return found
     return [
         f"{label}.opening_delay + {label}.closing_delay = "
-        f"{said(sum(delays.values()), 'opening_delay')} is {told}: no duty makes it open and close "
+        f"{said(sum(delays.values()), 'opening_delay')} is {late}: no duty makes it open and close "
         "in a period"
     ]

@@ -144,14 +144,14 @@ def _set(
     numbers = _in_unit(key, value, tol, unit)
     if numbers is None:
         unit, numbers = key.unit, (value, tol)
-    elif _told_by(tol) == _told_by(old):
+    elif _tolerance_key(tol) == _tolerance_key(old):
         _in_place(entry, key, value, numbers, tol != old)
         return
     text = entry_text(key._replace(unit=unit, path=()), *numbers, own=own)
     place[name] = tomlkit.value(text)
 
 
-def _told_by(tol: float) -> str:
+def _tolerance_key(tol: float) -> str:
     """Key that states a tolerance: ``unknown`` for infinity, ``tol``, or ``""`` for none."""
     return "unknown" if math.isinf(tol) else "tol" if tol else ""
 

@@ -92,8 +92,8 @@ def _value(reader: Reader, name: str, entry: Any) -> dict[str, float] | None:
     if isinstance(entry, Mapping):
         number, unit = entry.get("value"), entry.get("unit")
     else:
-        told = _TEXT.fullmatch(entry) if isinstance(entry, str) else None
-        number, unit = (_number(told[1]), told[2]) if told else (None, None)
+        match = _TEXT.fullmatch(entry) if isinstance(entry, str) else None
+        number, unit = (_number(match[1]), match[2]) if match else (None, None)
     if number is None or not isinstance(unit, str):
         reader.refuse(label, entry, f"a text like {like} is needed")
         return None

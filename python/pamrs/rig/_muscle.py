@@ -663,7 +663,7 @@ def _between(
     axes: tuple[Array, Array],
     axis: int,
 ) -> float:
-    """Largest error halfway between nodes of one axis, in the middle of the other one too [N]."""
+    """Largest error halfway between nodes of one axis, in the middle of the other axis too [N]."""
     places = [np.sort(np.concatenate([a, 0.5 * (a[1:] + a[:-1])])) for a in axes]
     places[axis] = 0.5 * (axes[axis][1:] + axes[axis][:-1])
     pressure, contraction = np.meshgrid(*places, indexing="ij")

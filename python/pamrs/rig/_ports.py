@@ -34,7 +34,7 @@ def connect(model: Mapping[str, Any]) -> tuple[Ports, list[str]]:
     Returns
     -------
     ports : dict
-        Links stand base first.
+        Links base first.
     problems : list of str
         Everything that is not connected or cannot be, one sentence each. With any, ``ports`` is not
         complete.
@@ -261,7 +261,7 @@ class _Connector:
                 )
 
     def source(self) -> str:
-        """The only supply that stands in front of no regulator, ``""`` if there are more."""
+        """The only supply in front of no regulator, ``""`` if there are more."""
         fronts = [ends.get("inlet") for ends in self.ports["supply"].values()]
         names = [n for n in self.tables["supply"] if qualified("supply", n) not in fronts]
         return self.only("supply", names)
@@ -434,7 +434,7 @@ class _Connector:
             ]
 
     def chain(self) -> None:
-        """Put the links base first, and note those that stand on the same one or in a circle."""
+        """Put the links base first, and note those mounted on the same one or in a circle."""
         before = "base"
         carries: dict[str, str] = {}
         for name in self.tables["link"]:

@@ -2,7 +2,7 @@
 
 A rig is blocks around a gas: supplies, valves, lines and chambers that the air goes through,
 muscles, joints and an arm or a load that the force goes through, sensors. Only ``gas`` and
-``chamber`` are always there. A block that stands once needs no name; several of a kind have one
+``chamber`` are always there. A block that occurs once needs no name; several of a kind have one
 each, and ports say which is connected to which. Everything inside is SI; angles are radians,
 pressures gauge.
 """
@@ -196,18 +196,18 @@ class Rig(View):
         return {"blocks": partial(_drawing.draw_blocks, rig=self), **forces}
 
     def _numbers(self) -> dict[str, str]:
-        told = {"rig": self.name, "blocks": ", ".join(self.blocks)}
+        facts = {"rig": self.name, "blocks": ", ".join(self.blocks)}
         for name, table in self.tables("muscle").items():
             full = qualified("muscle", name)
             ends = ((key, table[key]) for key in ("rest_length", "rest_diameter"))
             size = " x ".join(self.units.said(f"{full}.{key}", "m", end) for key, end in ends)
-            told[full] = f"{table['model']}, {size}, {table['count']} of them"
+            facts[full] = f"{table['model']}, {size}, {table['count']} of them"
         for name, table in self.tables("supply").items():
             full = qualified("supply", name)
             begun = self.units.said(f"{full}.initial_pressure", "Pa", table["initial_pressure"])
-            told[full] = f"{table['kind']}, {begun}"
-        told |= {"effects": ", ".join(full_name(e) for e in self.effects)} if self.effects else {}
-        return told | {"cautions": "; ".join(self.cautions) or "none"}
+            facts[full] = f"{table['kind']}, {begun}"
+        facts |= {"effects": ", ".join(full_name(e) for e in self.effects)} if self.effects else {}
+        return facts | {"cautions": "; ".join(self.cautions) or "none"}
 
     @property
     def cautions(self) -> list[str]:

@@ -74,7 +74,7 @@ def kind_of_entry(entry: Mapping[str, Any]) -> tuple[str, str, str]:
 
 
 def placed(entries: Iterable[Entry], entry: Entry) -> list[Entry]:
-    """The effects of a rig with one more, in the place of the first of those that it replaces."""
+    """The effects of a rig with one more, instead of the first of those that it replaces."""
     place, found, first = entry.get("at", ""), [], None
     for old in entries:
         if old["id"] != entry["id"] or (place and old.get("at", "") not in ("", place)):

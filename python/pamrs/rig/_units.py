@@ -17,7 +17,7 @@ _RANGE = re.compile(r"from (\S+) to (\S+) (\S+)")
 
 @dataclass(frozen=True)
 class Units:
-    """Units in which values of a rig are told: those of its file.
+    """Units in which values of a rig are written: those of its file.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Units:
         value : float
             In SI.
         tol : float, optional
-            Its standard deviation in SI, told with three figures where there is one.
+            Its standard deviation in SI, written with three figures where there is one.
         digits : str, optional
             How numbers are formatted.
 

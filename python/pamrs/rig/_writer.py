@@ -58,7 +58,7 @@ def toml_text(content: Content) -> str:
 
 
 def limit_lines(model: Mapping[str, Any]) -> list[str]:
-    """``[limits]`` as lines of TOML; none where the stand's are not given."""
+    """``[limits]`` as lines of TOML; none where the bench's are not given."""
     limits = model.get("limits", {})
     lines = ["", "[limits]"] if limits else []
     return lines + [

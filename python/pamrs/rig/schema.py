@@ -1,7 +1,7 @@
 """Every key of a rig file in one table, and the ports by which blocks name each other.
 
-The core tells unit, bounds, usual value and kind of each key, and whether it can carry a
-derivative (``crates/pam-core/src/keys.rs``); the words stand in ``words.toml``.
+The core has unit, bounds, usual value and kind of each key, and whether it can carry a derivative
+(``crates/pam-core/src/keys.rs``); the words are in ``words.toml``.
 """
 
 from __future__ import annotations
@@ -141,14 +141,14 @@ LIMITS: Final = (
 )
 
 
-def _key(block: str, told: dict[str, Any], note: str) -> Key:
+def _key(block: str, stated: dict[str, Any], note: str) -> Key:
     """A key as the core tells it, with its place in the file and its words."""
-    name, kind, usual = told["name"], told["kind"], told["usual"]
-    bounds = {} if kind == "choice" else {end: told[end] for end in ("lower", "upper")}
+    name, kind, usual = stated["name"], stated["kind"], stated["usual"]
+    bounds = {} if kind == "choice" else {end: stated[end] for end in ("lower", "upper")}
     inner = _INNER.get(block, {}).items()
     return Key(
         name,
-        told["unit"],
+        stated["unit"],
         **bounds,
         default=tuple(usual)
         if isinstance(usual, list)
@@ -156,12 +156,12 @@ def _key(block: str, told: dict[str, Any], note: str) -> Key:
         if kind == "count" and usual is not None
         else usual,
         kind=kind,
-        choices=tuple(told["choices"]),
+        choices=tuple(stated["choices"]),
         path=next(((t, name.removeprefix(f"{t}_")) for t, names in inner if name in names), ()),
-        only=tuple(told["only"]),
-        needs=told["needs"],
+        only=tuple(stated["only"]),
+        needs=stated["needs"],
         note=note,
-        moves=told["moves"],
+        moves=stated["moves"],
     )
 
 
@@ -171,15 +171,15 @@ _WORDS: Final[dict[str, dict[str, Any]]] = tomllib.loads(
 )
 
 BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
-    told["name"]: tuple(
-        _key(told["name"], key, _WORDS.get(told["name"], {}).get(key["name"], ""))
-        for key in told["keys"]
+    block["name"]: tuple(
+        _key(block["name"], key, _WORDS.get(block["name"], {}).get(key["name"], ""))
+        for key in block["keys"]
     )
-    for told in _CORE_BLOCKS
+    for block in _CORE_BLOCKS
 }
 """Block -> its keys, in the order in which they are written."""
 ACTS: Final[dict[str, tuple[str, ...]]] = {
-    told["name"]: tuple(told["acts_in"]) for told in _CORE_BLOCKS
+    block["name"]: tuple(block["acts_in"]) for block in _CORE_BLOCKS
 }
 """Kinds of block of the cut rig in which a block of the rig acts."""
 PORTS: Final[dict[str, tuple[Port, ...]]] = {
@@ -217,16 +217,16 @@ def _none(count: Any) -> bool:
 
 def kind_for(block: str, content: Mapping[str, Any], key: Key) -> Any:
     """The kind of a block on which it depends whether it has a key."""
-    told = next(k for k in BLOCKS[block] if k.kind == "choice" and {*key.only} <= {*k.choices})
-    return content.get(told.name, told.default)
+    choice = next(k for k in BLOCKS[block] if k.kind == "choice" and {*key.only} <= {*k.choices})
+    return content.get(choice.name, choice.default)
 
 
 def kind_of(block: str, content: Mapping[str, Any]) -> Any:
     """Force model of a muscle, flow of a valve, gas of a chamber, kind of a supply, line, joint,
     transmission, arm or load, None for the other blocks.
     """
-    told = next((key for key in BLOCKS[block] if key.kind == "choice"), None)
-    return None if told is None else content.get(told.name, told.default)
+    choice = next((key for key in BLOCKS[block] if key.kind == "choice"), None)
+    return None if choice is None else content.get(choice.name, choice.default)
 
 
 def qualified(block: str, name: str) -> str:

@@ -78,7 +78,7 @@ _BALANCE: Final = (
 
 
 def _with_energy_balance(text: str) -> str:
-    """A rig file whose chambers have an energy balance in the place of coefficients."""
+    """A rig file whose chambers have an energy balance instead of coefficients."""
     lines: list[str] = []
     inside = False
     for line in text.splitlines():
@@ -112,7 +112,7 @@ def template(like: str = "shoulder", name: str | None = None, gas: str = "energy
     Returns
     -------
     str
-        TOML that can be read as it stands.
+        TOML that can be read as it is.
 
     Raises
     ------

@@ -103,10 +103,10 @@ class BatchRun(View, Tabular, Mapping[str, Array]):
 
     def _numbers(self) -> dict[str, str]:
         rows = f"{self.time[-1]:.4g} s in {self.time.size} rows" if self.time.size else "no rows"
-        told = {"plants": f"{len(self.status)}, {self.failed.sum()} of them ended", "time": rows}
+        numbers = {"plants": f"{len(self.status)}, {self.failed.sum()} of them ended", "time": rows}
         last = {name: v[~self.failed, -1] for name, v in self.channels.items() if v.shape[1]}
         last |= {name: values[~self.failed] for name, values in self.reduced.items()}
-        return told | {
+        return numbers | {
             f"{name} at the end" if name in self.channels else name: (
                 in_laboratory_units(name, values.min(), values.max())
             )

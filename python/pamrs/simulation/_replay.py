@@ -1,4 +1,4 @@
-"""A rig driven by what a recording says went in: the simulation beside the measurement."""
+"""A rig driven by what a recording says went in: the simulation next to the measurement."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
 
 
 def reading(result: Simulation, channel: str) -> Array | None:
-    """Values that a sensor of a stand would read in a run.
+    """Values that a sensor of a bench would read in a run.
 
     Parameters
     ----------

@@ -224,7 +224,7 @@ class Simulation(View, Tabular, Mapping[str, Array]):
 
     def _happenings(self) -> list[_TimedCondition]:
         """Conditions that the recorded channels show: clipped commands, muscles that push."""
-        return [told for told in (*self._clipped(), *self._pushed()) if told.times]
+        return [condition for condition in (*self._clipped(), *self._pushed()) if condition.times]
 
     def _turns(self, of: Mask) -> list[float]:
         """Times from which something holds and from which it no longer does, in turn [s]."""
@@ -440,13 +440,13 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         return over_time({n: [("", self.time, v, {})] for n, v in channels.items()})
 
     def _numbers(self) -> dict[str, str]:
-        told = {"rig": self.rig.name, "time": f"{self.time[-1]:.4g} s in {self.time.size} rows"}
+        numbers = {"rig": self.rig.name, "time": f"{self.time[-1]:.4g} s in {self.time.size} rows"}
         for head in ("muscle_pressure", "joint_angle", "length"):
             for block, values in self.under(head).items():
                 span = in_laboratory_units(head, values.min(), values.max())
                 last = in_laboratory_units(head, values[-1])
-                told[dotted(head, block)] = f"{span}, at the end {last}"
-        return told | {"events": str(len(self.events))}
+                numbers[dotted(head, block)] = f"{span}, at the end {last}"
+        return numbers | {"events": str(len(self.events))}
 
     def __repr__(self) -> str:
         return f"Simulation({self.rig.name}: {self.time.size} rows of {', '.join(self._channels)})"
@@ -658,7 +658,7 @@ def _is_long(signal: Signals | None) -> bool:
 
 def rows_of(duration: float, sample_time: float, setting: Iterable[str]) -> int:
     """Rows of a duration [s], as many as a run may keep at most; signals that set it are refused
-    beside it.
+    together with it.
     """
     for name in setting:
         raise ParameterError(

@@ -105,11 +105,11 @@ class _Guard:
 
 
 async def _received(request: Request, file: Path) -> None:
-    """Write the body of a request to a new file; a part of it never stands under that name."""
+    """Write the body of a request to a new file; a part of it never has that name."""
     size = 0
-    beside = file.with_name(f".{secrets.token_hex(8)}.part")
+    part_file = file.with_name(f".{secrets.token_hex(8)}.part")
     try:
-        with beside.open("xb") as stream:
+        with part_file.open("xb") as stream:
             async for part in request.stream():
                 size += len(part)
                 if size > MOST_BYTES:
@@ -120,9 +120,9 @@ async def _received(request: Request, file: Path) -> None:
                 await run_in_threadpool(stream.write, part)
         if os.path.lexists(file):  # since it was asked
             raise ParameterError(f"{file.name}: is there already; give the new log another name")
-        beside.rename(file)
+        part_file.rename(file)
     finally:
-        beside.unlink(missing_ok=True)
+        part_file.unlink(missing_ok=True)
 
 
 async def _upload(studio: Studio, request: Request) -> None:
@@ -202,9 +202,9 @@ def make_app(studio: Studio, token: str) -> ASGIApp:
         if run is None:
             return JSONResponse({"running": False})
         left = "" if run.left is None else f"about {duration_words(run.left)} left"
-        told = {"running": run.running, "share": run.share or 0.0, "left": left}
-        told["leading"] = run.leading
-        return JSONResponse(told | {"lines": run.lines[-6:], "error": studio.said_of_run()})
+        state = {"running": run.running, "share": run.share or 0.0, "left": left}
+        state["leading"] = run.leading
+        return JSONResponse(state | {"lines": run.lines[-6:], "error": studio.said_of_run()})
 
     def result(request: Request) -> Response:
         name = request.path_params["name"]

@@ -180,7 +180,7 @@ class Studio:
     # Rig ---------------------------------------------------------------------------------------
 
     def put_rig(self, text: str) -> None:
-        """Write ``rig.toml``, right or wrong: what is wrong is told, and can be mended."""
+        """Write ``rig.toml``, right or wrong: what is wrong is reported, and can be mended."""
         write_atomically(self.path("rig.toml"), text)
         self.changed()
 

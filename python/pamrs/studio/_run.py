@@ -108,12 +108,12 @@ class Run:
         self._listener.start()
 
     def _listen(self) -> None:
-        told: str | None = None
+        outcome: str | None = None
         try:
-            while told is None:
+            while outcome is None:
                 item = self._pipe.recv()
                 if isinstance(item, str):
-                    told = item
+                    outcome = item
                 else:
                     line, self.share, self.left = item
                     self.lines = [*self.lines[-_LINES:], line]
@@ -122,19 +122,19 @@ class Run:
         self._process.join(_PATIENCE)
         for left in self._folder.glob(f"{_MADE}*"):  # of one that was ended
             shutil.rmtree(left, ignore_errors=True)
-        if told is None:
+        if outcome is None:
             code = self._process.exitcode
-            told = f"the diagnosis ended without a result (exit code {code})"
-        self.error, self.running = self.error or told, False
+            outcome = f"the diagnosis ended without a result (exit code {code})"
+        self.error, self.running = self.error or outcome, False
 
     @property
     def leading(self) -> list[str]:
         """The hypotheses in the lead so far, in words, a text for each part of the rig."""
         found: dict[str, str] = {}
         for line in self.lines:
-            part, told, names = line.partition(_SCREENED)
+            part, separator, names = line.partition(_SCREENED)
             keys = [one.rpartition(" ")[0] for one in names.split(", ")[:_MOST]]
-            if told and all(keys):
+            if separator and all(keys):
                 words = ", ".join(hypothesis_label(key) for key in keys)
                 found[part] = f"{part}: in the lead {'is' if len(keys) == 1 else 'are'} {words}"
         return list(found.values())

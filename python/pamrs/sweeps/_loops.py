@@ -50,7 +50,7 @@ class SweptLoop(Drive):
         Numbers for :func:`pamrs.control.sweep`: ``duration``, ``sample_time``, ``step``,
         ``initial``.
     by_length : bool
-        Whether the length of a hanging mass is followed, in the place of an angle.
+        Whether the length of a hanging mass is followed, instead of an angle.
     """
 
     controller: Callable[..., Any]

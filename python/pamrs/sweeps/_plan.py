@@ -88,7 +88,7 @@ _CALLED: Final = {
     "order of the axes": "over (order of the axes)",
     "runs of a chunk": "chunk",
 }
-_MOST_TOLD: Final = 4
+_MOST_LISTED: Final = 4
 
 
 def differences(stored: dict[str, Any], wanted: dict[str, Any]) -> list[str]:
@@ -150,20 +150,25 @@ def _rigs(old: object, new: object) -> str:
         was, now = parse_rig(old), parse_rig(new)
     except RigError:
         return "another rig than that of the store"
-    told = []
+    differences = []
     for name in dict.fromkeys([*was.parameters, *now.parameters]):
         one, other = was.parameters.get(name), now.parameters.get(name)
         if one is None or other is None:
-            told.append(f"{name} is {'not in the store' if one is None else 'in the store only'}")
+            differences.append(
+                f"{name} is {'not in the store' if one is None else 'in the store only'}"
+            )
         elif one.value != other.value:
             values = (with_unit(f"{p.value:.6g}", p.unit) for p in (one, other))
-            told.append(f"{name} = {' in the store, '.join(values)} now")
+            differences.append(f"{name} = {' in the store, '.join(values)} now")
         elif one.tol != other.tol:
-            told.append(f"another tolerance of {name}")
+            differences.append(f"another tolerance of {name}")
     if was.effects != now.effects:
-        told.append("other effects")
+        differences.append("other effects")
     if was.name != now.name:
-        told.append(f"{was.name!r} in the store, {now.name!r} now")
-    rest = len(told) - _MOST_TOLD
+        differences.append(f"{was.name!r} in the store, {now.name!r} now")
+    rest = len(differences) - _MOST_LISTED
     more = [f"{rest} more"] if rest > 0 else []
-    return "; ".join([*told[:_MOST_TOLD], *more]) or "other blocks, or what is connected to what"
+    return (
+        "; ".join([*differences[:_MOST_LISTED], *more])
+        or "other blocks, or what is connected to what"
+    )

@@ -1,5 +1,5 @@
-"""Chunks through an executor: a bounded number in flight, each kept as soon as it is done and told
-as progress.
+"""Chunks through an executor: a bounded number in flight, each kept as soon as it is done and
+reported as progress.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def run_missing(
     executor : Executor or None
         Where; None for this process.
     progress : Progress
-        Is told of each chunk.
+        Counts each chunk.
     threads : int or None
         Most threads of one chunk.
     most : int

@@ -1,4 +1,4 @@
-"""The store of a sweep: a Zarr group, and beside its arrays the plan and the journal of the chunks
+"""The store of a sweep: a Zarr group, and next to its arrays the plan and the journal of the chunks
 that are done.
 
 A chunk is written whole to every array, then a line of the journal says so. A process that is
@@ -80,7 +80,7 @@ def read_journal(path: Path) -> tuple[dict[int, StoredChunk], int]:
     -------
     entries : dict of int to StoredChunk
     size : int
-        What stands behind it was being written when a process was killed.
+        What follows it was being written when a process was killed.
     """
     entries: dict[int, StoredChunk] = {}
     size = 0
@@ -176,7 +176,7 @@ class Store:
         return [*coordinates, *self.plan.drive.metric_units(), ENDED_AT]
 
     def _make(self, rig: Rig) -> None:
-        """A store without a chunk, written beside and renamed."""
+        """A store without a chunk, written under another name and renamed."""
         new = self.path.with_name(f".{self.path.name}.new")
         shutil.rmtree(new, ignore_errors=True)
         try:

@@ -202,10 +202,10 @@ def test_a_sound_gauge_has_the_noise_of_its_third_differences(
     """The quietest band of few samples is quieter than the others, and far from telling."""
 
     def level(share: float) -> float:
-        monkeypatch.setattr(_signals, "_QUIET_SHARE", share)
+        monkeypatch.setattr(_signals, "_BAND_SHARE", share)
         return noise_level(values, usable, seed=SETTINGS.seed)
 
-    usual = _signals._QUIET_SHARE
+    usual = _signals._BAND_SHARE
     for seed in range(40):
         values = np.random.default_rng(seed).normal(0.0, 1.0, 600)
         usable = np.ones(600, dtype=bool)

@@ -173,7 +173,7 @@ def test_a_recording_that_fits_nothing_takes_no_weight_from_the_others() -> None
     inflation = inflation_of(problem, found, {})
     assert list(inflation.apart) == [("force", "r3")]
     assert inflation.apart["force", "r3"] > 1e3 * inflation["force"]
-    (told,) = problem.losses.told
+    (told,) = problem.losses.sentences
     assert "block force: the refitted model misses r3 by" in told
 
 
@@ -227,6 +227,6 @@ def test_a_refit_that_went_no_further_says_so() -> None:
     problem = problem_of(tight, [pulled(true_bench(), "fit", k) for k in range(3)])
     found = refitted(problem, tight, no_inflation(problem.blocks))
     assert abs(found.moved["muscle.rest_length"]) < 0.1
-    (told,) = problem.losses.told
+    (told,) = problem.losses.sentences
     assert "the refit of the baseline stopped" in told
     assert "load.min_length = 16.7 cm" in told

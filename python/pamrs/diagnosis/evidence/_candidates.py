@@ -153,8 +153,12 @@ def misses_only_held_out(
     """True where a fit leaves noise in its own recordings and more in held-out ones: parameters
     that its own recordings do not determine may bring that (docs/decisions/0111).
     """
-    quiet = not any(significant(e) for e in fit_excess.values())
-    return not nothing_held_out and quiet and any(significant(e) for e in held_out_excess.values())
+    noise_only = not any(significant(e) for e in fit_excess.values())
+    return (
+        not nothing_held_out
+        and noise_only
+        and any(significant(e) for e in held_out_excess.values())
+    )
 
 
 def share_left(
@@ -196,10 +200,10 @@ def explains(
     candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
 ) -> bool:
     """True where a candidate leaves only noise, fitted and held out, of what was clearly more."""
-    quiet = not any(
+    noise_only = not any(
         significant(e[b.name])
         for b in suspects
         for e in (candidate.fit_excess, candidate.held_out_excess)
     )
     before, after = max(_excesses(candidate, baseline, suspects))
-    return quiet and after < _EXPLAINED_SHARE * before
+    return noise_only and after < _EXPLAINED_SHARE * before

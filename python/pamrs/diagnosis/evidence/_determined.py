@@ -53,7 +53,7 @@ def has_undetermined_effect(candidate: FittedHypothesis) -> bool:
     """True where all fitted sizes of an effect together are within one standard deviation of zero.
     Effects with times of their own are left out: these times determine them.
 
-    What happened at times of its own in single recordings is told by when it happened.
+    Whatever happened at times of its own in single recordings is determined by when it happened.
     """
     fitted = candidate.fit
     happened = None if fitted.events is None else fitted.events.effect

@@ -44,14 +44,14 @@ _MOST_RANGE_PRICE = 4.0
 SHARED_ODDS = 6.0
 # `UNDECIDED` of a group of which only noise is left is divided by these numbers (decision 4):
 # most of it goes to parameters where these moved, else to none
-_QUIET_LIKELY = 0.83
+_NOISE_ONLY_LIKELY = 0.83
 # of none where parameters moved, of parameters where they did not
-_QUIET_OTHER = 0.03
+_NOISE_ONLY_OTHER = 0.03
 # of unlisted: in 24 of 171 such groups physics was missing that was too small to be seen
-_QUIET_UNLISTED = 0.14
+_NOISE_ONLY_UNLISTED = 0.14
 # of parameters where their values are unlikely: these explain all, at a price the owner would mind
-_STRAINED_PARAMETERS = 0.75
-_STRAINED_UNLISTED = 0.25  # of unlisted there
+_UNLIKELY_PARAMETERS = 0.75
+_UNLIKELY_UNLISTED = 0.25  # of unlisted there
 # [tolerances] moved to its wall (fit.most_tolerances), which is suspect (decision 25)
 WALL_TOLERANCES = 2.9
 # [noise levels] left in a group below which nothing has no name: both such groups of 40 read cases
@@ -128,10 +128,14 @@ def shares_of_undecided(*, unlikely: bool, nominal_misses: bool) -> Mapping[Hypo
     whether the values of the baseline are unlikely, and whether the nominal model misses.
     """
     if unlikely:
-        return {PARAMETERS: _STRAINED_PARAMETERS, UNLISTED: _STRAINED_UNLISTED}
+        return {PARAMETERS: _UNLIKELY_PARAMETERS, UNLISTED: _UNLIKELY_UNLISTED}
     if nominal_misses:
-        return {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
-    return {PARAMETERS: _QUIET_OTHER, NONE: _QUIET_LIKELY, UNLISTED: _QUIET_UNLISTED}
+        return {
+            PARAMETERS: _NOISE_ONLY_LIKELY,
+            NONE: _NOISE_ONLY_OTHER,
+            UNLISTED: _NOISE_ONLY_UNLISTED,
+        }
+    return {PARAMETERS: _NOISE_ONLY_OTHER, NONE: _NOISE_ONLY_LIKELY, UNLISTED: _NOISE_ONLY_UNLISTED}
 
 
 def probability_cap(fitted: Problem, mismatch: Block, rms_left: float, *, alone: bool) -> float:

@@ -84,9 +84,9 @@ def _located(judged: Judged) -> str | None:
         return group.mismatch.name
     moved = parameters_at_wall(group.candidates[0].fit)
     worst = judged.wrong or tuple(sorted(moved, key=lambda name: -abs(moved[name])))
-    told = [b.name for b in group.blocks if worst and depends(b, worst[0])]
+    moved_in = [b.name for b in group.blocks if worst and depends(b, worst[0])]
     named = [b.name for b in group.blocks if any(concerns(term, b) for term in judged.named)]
-    return next(iter([*reversed(told), *reversed(named)]), None)
+    return next(iter([*reversed(moved_in), *reversed(named)]), None)
 
 
 def not_judged(block: Unjudged) -> BlockVerdict:
@@ -109,9 +109,9 @@ def _sizes(
     """Excess of a block at every stage [noise levels, channel's unit], and if it is significant."""
     sizes = {}
     for stage, residuals in found.items():
-        told = excess(block, problem.recordings, residuals, noise_level, problem.settings)
+        size = excess(block, problem.recordings, residuals, noise_level, problem.settings)
         sizes[stage] = MismatchSize(
-            told.systematic, told.systematic * told.noise, significant(told)
+            size.systematic, size.systematic * size.noise, significant(size)
         )
     return MismatchStages(**sizes)
 

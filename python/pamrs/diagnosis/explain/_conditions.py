@@ -196,7 +196,7 @@ def _shares(regimes: dict[str, Mask], z: Array, *, rising: bool) -> list[Conditi
 
 
 _ONE_SIDED = 0.5
-"""Mean over root mean square from which a residual is told to lie on one side."""
+"""Mean over root mean square from which a residual is said to lie on one side."""
 
 
 def _sign(z: Array, *, rising: bool) -> str:

@@ -40,7 +40,7 @@ def acts_in(effect: Term, block: Block) -> bool:
     """
     info, at = effect.info, effect.at
     kinds = info.acts_in or ACTS.get(info.block, ())
-    there = any(kind in kinds for kind in (block.kind, *block.beside))
+    there = any(kind in kinds for kind in (block.kind, *block.simulated))
     return there and (not at or _has(block, info.at, at))
 
 

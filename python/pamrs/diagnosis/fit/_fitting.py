@@ -268,7 +268,7 @@ def residuals(
     names : sequence of str, optional
         Dotted parameters to differentiate with respect to.
     events : Events, optional
-        What happens in single recordings, beside the model.
+        What happens in single recordings, in addition to the model.
     """
     recordings = [prepared.recording.name for prepared in problem.recordings]
     happened = [n for n in recordings if events is not None and events.values.get(n)]
@@ -327,7 +327,7 @@ def _shift(known: Parameter) -> float:
 def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:
     """Apply a function to each item, two at a time; results in the order of the items.
 
-    For whole fits and simulations: steps of one that cannot be shared are done beside the other's.
+    For whole fits and simulations: steps of one that cannot be shared overlap with the other's.
     """
     with ThreadPoolExecutor(max_workers=2) as pool:
         return list(pool.map(function, items))

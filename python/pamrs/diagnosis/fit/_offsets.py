@@ -1,6 +1,6 @@
 """Offsets of commands: parts of a sample by which they acted earlier or later than logged.
 
-A log that runs by itself beside the loop sees a command at its next sample, and a loop may send it
+A log that runs by itself next to the loop sees a command at its next sample, and a loop may send it
 after the sensors were read. What that does to a pressure is neither a lag nor a value of the rig;
 it is a nuisance of the recording, as the start of a window is.
 """

@@ -20,7 +20,7 @@ _FOLDS = 4  # of stretches of time: each is told from the others
 _STRETCHES = 12  # of each recording
 _SMOOTHING_RIDGE = 1e-3  # of the rows' weight: what no row tells stays zero
 _CLEARER = 0.05  # share of the square by which a less simple function must tell more
-_LEAST_TOLD = 0.4  # share of the square from which an argument explains the input
+_LEAST_EXPLAINED = 0.4  # share of the square from which an argument explains the input
 _TURN = 0.02  # of the fastest rate, below which a motion has no direction
 _TREND = 0.8  # correlation from which a size grows or falls with an argument
 _ONE_SIGN_SHARE = 0.8  # mean over mean size from which an input has one direction
@@ -31,7 +31,7 @@ _LEAST_OF_SQUARE = 0.1  # share of its square in such a time
 _MOST_OF_TIME = 0.6  # share of a recording up to which that is told
 # share of the square that an argument leaves at least beside such times, and by so many times more
 # than there is at all others
-_LEFT_BESIDE_TIMES, _MORE_THAN_OTHER_TIMES = 0.2, 5.0
+_LEFT_BY_ARGUMENT, _MORE_THAN_OTHER_TIMES = 0.2, 5.0
 _MOST_TIMES = 5  # of an input in all recordings
 _FASTER = 1.4  # the same of the fastest third of a motion and the middle one
 
@@ -203,7 +203,7 @@ def with_words(missing: MissingInput) -> MissingInput:
         With ``argument``, ``explained``, ``sentence`` and ``times``.
     """
     argument, share, sentence = _explained(missing)
-    times = [] if 1.0 - share < _LEFT_BESIDE_TIMES else times_of(missing.recordings)
+    times = [] if 1.0 - share < _LEFT_BY_ARGUMENT else times_of(missing.recordings)
     inside = [
         _during(recording, t)
         for recording in missing.recordings
@@ -240,7 +240,7 @@ def _explained(missing: MissingInput) -> tuple[str, float, str]:
     shares = {name: along.share_predicted(columns) for name, columns in candidates.items()}
     best = max(shares.values())
     name = next(n for n, share in shares.items() if share > best - _CLEARER)
-    if best < _LEAST_TOLD:
+    if best < _LEAST_EXPLAINED:
         size = _shown(along.mean(np.abs(along.value), along.weight > 0.0), missing.unit)
         named = _share_of_names(missing, along)
         return "", max(0.0, best), f"{size}{named or ', and no single argument explains it'}"
@@ -253,12 +253,12 @@ def _explained(missing: MissingInput) -> tuple[str, float, str]:
         )
         for n in others
     }
-    beside = max(deeper, key=lambda n: deeper[n], default="")
-    if beside and deeper[beside] < shares[name] + _CLEARER:
-        beside = ""
+    second = max(deeper, key=lambda n: deeper[n], default="")
+    if second and deeper[second] < shares[name] + _CLEARER:
+        second = ""
     sentence = _sentence(missing, along, name, along.fitted(columns, along.weight > 0.0))
-    if beside:
-        sentence += _on_second_argument(missing, along, name, beside)
+    if second:
+        sentence += _on_second_argument(missing, along, name, second)
     argument = {"": "time", "strokes": missing.position}.get(name, name)
     return argument, min(1.0, max(shares[name], 0.0)), sentence + _share_of_names(missing, along)
 
@@ -270,7 +270,7 @@ def _share_of_names(missing: MissingInput, along: _JoinedInput) -> str:
         return ""
     rest, whole = (along.value - np.concatenate(laws)) ** 2, along.value**2
     share = 1.0 - float(along.weight @ rest) / max(float(along.weight @ whole), 1e-300)
-    return f", of which {100.0 * share:.0f} % is what is named" if share > _LEAST_TOLD else ""
+    return f", of which {100.0 * share:.0f} % is what is named" if share > _LEAST_EXPLAINED else ""
 
 
 def _scaled(x: Array) -> Array:
@@ -327,19 +327,19 @@ def _sentence(missing: MissingInput, along: _JoinedInput, name: str, fit: Array)
     return f"{size_in_words}, {'growing' if trend > 0.0 else 'falling'} with the {noun}"
 
 
-def _on_second_argument(missing: MissingInput, along: _JoinedInput, name: str, beside: str) -> str:
+def _on_second_argument(missing: MissingInput, along: _JoinedInput, name: str, second: str) -> str:
     """Dependence of the input's size on a second argument, in words."""
     rate = np.abs(along.arguments[missing.rate])
     rows = rate > np.median(rate) if name == missing.rate else along.weight > 0.0
-    low, _, high = along.thirds(along.arguments[beside], rows)
+    low, _, high = along.thirds(along.arguments[second], rows)
     sizes = [along.mean(np.abs(along.value), part) for part in (low, high)]
-    places = [along.mean(along.arguments[beside], part) for part in (low, high)]
+    places = [along.mean(along.arguments[second], part) for part in (low, high)]
     if max(sizes) < _OTHER_SIZE * min(sizes):
-        return f", other at another {spoken_name(beside)}"
+        return f", other at another {spoken_name(second)}"
     larger = int(sizes[1] > sizes[0])
     ratio = sizes[larger] / max(sizes[1 - larger], 1e-300)
     times = "twice" if 1.75 < ratio < 2.25 else f"{format_number(ratio, 2)} times"
     at_larger, at_smaller = (
-        _shown(place, missing.units[beside]) for place in (places[larger], places[1 - larger])
+        _shown(place, missing.units[second]) for place in (places[larger], places[1 - larger])
     )
-    return f", {times} as large at a {spoken_name(beside)} of {at_larger} as of {at_smaller}"
+    return f", {times} as large at a {spoken_name(second)} of {at_larger} as of {at_smaller}"

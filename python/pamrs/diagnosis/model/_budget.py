@@ -373,7 +373,7 @@ def owners_of_parameters(candidates: list[FittedHypothesis]) -> dict[str, int]:
     the last one along the chain, whose output it is.
 
     What a group leaves without a name is in its autocorrelation, and so in its standard deviations.
-    Events are fitted with the values beside them, which stay.
+    A group with events keeps all values that it moved: its events were fitted with them.
     """
 
     def spread(k: int, name: str) -> float:

@@ -72,7 +72,7 @@ class Models:
     Attributes
     ----------
     judged : list of Judged
-        The groups, what they name fitted beside what other groups know better.
+        The groups, what they name fitted together with what other groups know better.
     starts, chosen : list of FittedHypothesis
         The baseline of each group, and what goes into the final model, with standard deviations
         that hold for equations that are not quite the rig's.
@@ -139,7 +139,7 @@ class Conclusion:
     runs : list of FreeRun or None
         Simulations of each recording from its commands alone, and a note on them.
     runs_note : str
-        What is to be said beside them.
+        The note on the runs.
     curves : list of Trace
         Those of the recording that the nominal model misses most.
     own_errors : dict of str to float
@@ -468,7 +468,7 @@ def _with_common_zeros(
 ) -> list[FittedHypothesis]:
     """Refit groups with sensors' zeros held that another group determines better and differently.
 
-    A rig has one zero of a sensor; the other values of a fit are right beside its own only.
+    A rig has one zero of a sensor; the other values of a fit hold with its own zero only.
     """
     owners = owners_of_parameters(chosen)
     settled_candidates = list(chosen)

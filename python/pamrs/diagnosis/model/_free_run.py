@@ -92,7 +92,7 @@ def free_run(
     nominal, final : Rig
         The model of the rig file, and the one with what was found.
     events : Events or None
-        What happened in single recordings, in the place of what `final` says.
+        What happened in single recordings, instead of what `final` says.
     known : KnownValues, optional
         What is known of the values of `final`; without it no channel is said to be off.
     noise_level : dict of NoiseLevel, optional
@@ -101,9 +101,9 @@ def free_run(
     Returns
     -------
     tuple of (list of FreeRun or None, str, list of Trace)
-        One entry for each recording that could be simulated, and what is to be said beside them;
-        None and the reason where no recording has the commands that the rig needs. The curves of
-        the recording that the nominal model misses most, in noise levels, channel by channel.
+        One entry for each recording that could be simulated, and a note on them; None and the
+        reason where no recording has the commands that the rig needs. The curves of the recording
+        that the nominal model misses most, in noise levels, channel by channel.
     """
     runs, missing, curves, most = [], [], list[Trace](), -1.0
     for prepared in (_with_starts(p, problem, by_stage["after"]) for p in problem.recordings):
@@ -279,8 +279,8 @@ def _least_missing_step(
         step = np.zeros(at.size)
         step[k] = -0.5 if at[k] > 0.0 else 0.5
         with contextlib.suppress(PamrsError, ArithmeticError):  # it has no slope there
-            beside = run(at + step)
-            slopes[:, k] = (np.concatenate([beside[n] for n in now]) - here) / step[k]
+            stepped = run(at + step)
+            slopes[:, k] = (np.concatenate([stepped[n] for n in now]) - here) / step[k]
     axes, size, directions = np.linalg.svd(slopes, full_matrices=False)
     wanted = axes.T @ (slopes @ at - here)  # along each axis, as an offset from what is known
     # as far as a draw is in as many directions as are seen

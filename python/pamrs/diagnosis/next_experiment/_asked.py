@@ -427,13 +427,13 @@ def _missed_without(
 
 def _measured(values: Sequence[Term], rig: Rig) -> str:
     """Sentence that asks to measure values of the rig file by themselves."""
-    ways, told = words("measured"), list[str]()
+    ways, names = words("measured"), list[str]()
     for term in values:
         known = rig.parameters.get(term.id)
         way = ways.get(term.id.rpartition(".")[2], ways.get(known.unit) if known else None)
-        told.append(spoken_name(term.id) + (f" ({way})" if way else ""))
+        names.append(spoken_name(term.id) + (f" ({way})" if way else ""))
     return (
-        f"Measure the {' or the '.join(told)} by itself: these recordings cannot tell which is "
+        f"Measure the {' or the '.join(names)} by itself: these recordings cannot tell which is "
         "wrong"
     )
 

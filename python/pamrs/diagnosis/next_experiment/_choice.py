@@ -197,7 +197,7 @@ def outcome_of(
     """Simulate an experiment with every hypothesis, and compare every pair.
 
     Where experiments are only ranked, each hypothesis has the sensitivities that it has on its own
-    recordings, which are worked out once; :meth:`Outcome.exactly` gives what is told.
+    recordings, which are worked out once; :meth:`Outcome.exactly` gives what is reported.
 
     Parameters
     ----------
@@ -328,7 +328,7 @@ def propose(
     settings : DiagnosisSettings, optional
         How experiments are compared; the published ones by default.
     losses : Losses, optional
-        Told of an experiment that fails, which is then left out; raised by default.
+        Notes an experiment that fails, which is then left out; raised by default.
 
     Returns
     -------
@@ -389,8 +389,8 @@ def propose(
             if enough and max(o.bits for o in found) > uncertainty - 0.5 * _RESOLUTION:
                 break  # what is left costs more and cannot tell more
             one = partial(outcome, experiment, sensor)
-            told = one() if losses is None else losses.part(f"experiment {experiment.name}", one)
-            found += [] if told is None else [told]
+            compared = one() if losses is None else losses.part(f"experiment {experiment.name}", one)
+            found += [] if compared is None else [compared]
     if not found:
         raise DiagnosisError(
             f"no experiment of rig {nominal.name!r} can be simulated with all of "

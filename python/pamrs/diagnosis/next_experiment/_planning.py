@@ -120,11 +120,11 @@ def plan_diagnosis(
     usable, tell = {}, Steps(progress)
     for done, (name, each) in enumerate(recorded.items()):
         tell(name, done / len(recorded))
-        stands = pool[name].changed(rig)
+        changed = pool[name].changed(rig)
         try:
             for k, (_, cut) in enumerate(layers):
                 visited = [own[k] for own in recorded.values()]
-                products |= _products(cut, stands, each[k], visited, starts, free, settings)
+                products |= _products(cut, changed, each[k], visited, starts, free, settings)
         except SimulationError:
             continue  # the cut chain leaves the range of the model there
         usable[name] = pool[name]
@@ -241,8 +241,8 @@ def _noise(rig: Rig, given: Mapping[str, float] | None) -> dict[str, float]:
             raise ParameterError(
                 f"noise of {name} = {value} is not allowed: a finite number > 0 is needed"
             )
-    told = {name: float(value) for name, value in (given or {}).items()}
-    return noise_of(rig, told)
+    levels = {name: float(value) for name, value in (given or {}).items()}
+    return noise_of(rig, levels)
 
 
 def _chosen(
@@ -310,12 +310,12 @@ def _recorded(
     """
     found = {}
     for name, experiment in pool.items():
-        stands = experiment.changed(rig)
+        changed = experiment.changed(rig)
         with contextlib.suppress(SimulationError):
             run = experiment.simulate(rig)
             found[name] = [
                 with_unjudged_starts(
-                    blocks, core_rig(stands), taken(run, stands, name, heard, settings)
+                    blocks, core_rig(changed), taken(run, changed, name, heard, settings)
                 )
                 for channels, blocks in layers
                 for heard in [{c: v for c, v in noise.items() if c in channels}]

@@ -28,11 +28,13 @@ OperatingRanges = Mapping[str, tuple[float, float]]
 """Least value and width of each signal over some recordings, by channel [SI]."""
 
 _FLOWS = {"supply": ("supply", "line"), "chamber": ("line", "chamber"), "flow": ("line",)}
-"""Blocks of a rig file whose share of error is one of the flow into a block, beside the valve."""
+"""Blocks of a rig file whose share of error is one of the flow into a block, in addition to the
+valve's.
+"""
 _FACTORS = ("muscle", "transmission", "joint")
 """Blocks whose share of error multiplies the muscles' pull."""
 _SUMMANDS = ("arm", "link", "load")
-"""Blocks whose share of error stands beside the muscles' pull."""
+"""Blocks whose share of error is added to that of the muscles' pull."""
 _IMPERFECT = ("supply", "valve", "chamber", "muscle", "transmission")
 """Blocks that have a usual error: what makes flows, and what makes forces."""
 _GAUGES = ("muscle_pressure", "joint_angle")

@@ -53,10 +53,10 @@ class NoiseLevel:
         mean square of the bin means.
     curve_share : float
         Share of the variance of bin means that is the curve error.
-    beside_curves : float
-        Standard deviation of bin means beside what its curves tell of them.
+    off_curves : float
+        Standard deviation of bin means about what its curves predict.
     rest_share : float
-        Share of that variance that is curve error which no such curve tells.
+        Share of that variance that is curve error which no such curve predicts.
     curves : (m, k) array or None
         What each curve, one standard deviation high, does to the bin means; None where no curve
         error acts.
@@ -69,7 +69,7 @@ class NoiseLevel:
     binned: float
     scatter: float = 0.0
     curve_share: float = 0.0
-    beside_curves: float = 0.0
+    off_curves: float = 0.0
     rest_share: float = 0.0
     curves: Array | None = field(default=None, repr=False, compare=False)
     inflation: float = 1.0
@@ -320,7 +320,7 @@ def _with_error(noise: float, error: float) -> dict[str, float]:
     return {
         "binned": math.sqrt(noise + error),
         "curve_share": error / (noise + error),
-        "beside_curves": math.sqrt(noise + rest),
+        "off_curves": math.sqrt(noise + rest),
         "rest_share": rest / (noise + rest),
     }
 
@@ -384,7 +384,7 @@ def excess(
 
     Where the model has a curve error, all of the residual is compared with noise and that error
     together; and what its most probable curves leave of it, with what they cost, with the noise
-    beside them. The one that is farther above its limit counts.
+    about them. The one that is farther above its limit counts.
     """
     width = {p.recording.name: bins_of(p) for p in recordings}
     bins = {
@@ -398,18 +398,18 @@ def excess(
     if all(level.curves is None for level in whole.values()):
         return against_all
     apart = {
-        key: replace(level, binned=level.beside_curves, curve_share=level.rest_share)
+        key: replace(level, binned=level.off_curves, curve_share=level.rest_share)
         for key, level in whole.items()
     }
-    beside = _pooled(recordings, _beside_curves(bins, apart), residuals, apart, settings)
-    return max(against_all, beside, key=lambda e: e.ratio / e.limit)
+    against_rest = _pooled(recordings, _off_curves(bins, apart), residuals, apart, settings)
+    return max(against_all, against_rest, key=lambda e: e.ratio / e.limit)
 
 
 Bins = dict[Key, tuple[Array, Array]]
 """Means, and usable samples, of the bins of a block in a recording."""
 
 
-def _beside_curves(bins: Bins, levels: dict[Key, NoiseLevel]) -> Bins:
+def _off_curves(bins: Bins, levels: dict[Key, NoiseLevel]) -> Bins:
     """Bin means without the most probable curves, so that noise and such curves alone leave the
     variance of the noise (one curve for all recordings).
     """

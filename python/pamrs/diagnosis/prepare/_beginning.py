@@ -3,10 +3,10 @@
 A regulator whose outlet has no gauge begins a recording somewhere between what it feeds and what it
 is set to: at rest all three are the same, and a log that begins as a stopcock is opened has them
 bars apart; a recording that states its ``initial_pressure`` settles that. Along a tube of segments
-gas stands or flows: at rest its pressure is that of its ends, and a log that begins while air flows
-has a gradient there. What a block predicts from either tells the samples that depend on it; these
-are not judged. A joint begins at rest where that suits what follows better than the slope of its
-first samples.
+gas is at rest or flows: at rest its pressure is that of its ends, and a log that begins while air
+flows has a gradient there. What a block predicts from either tells the samples that depend on it;
+these are not judged. A joint begins at rest where that suits what follows better than the slope of
+its first samples.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ class _Beginnings:
         """Samples up to the last one that shows how what nobody measured in a block began."""
         return max(
             self._last_sample(block, self._change_by_outlets(block))
-            if _regulator_commands(block) and block.beside
+            if _regulator_commands(block) and block.simulated
             else 0,
             self._last_sample(block, self._change_by_tubes(block)) if block.tubes else 0,
         )
@@ -288,7 +288,7 @@ def _regulator_commands(block: Block) -> list[str]:
 def _unmeasured(block: Block) -> str:
     """Words on what nobody measured in a block, and on what would measure it."""
     reasons = []
-    if _regulator_commands(block) and block.beside:
+    if _regulator_commands(block) and block.simulated:
         gauges = [dotted("supply_pressure", block_of(name)) for name in _regulator_commands(block)]
         reasons.append(
             "they show where the regulator began, and nobody measured that (a gauge for "

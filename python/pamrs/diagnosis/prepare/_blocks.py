@@ -131,7 +131,7 @@ class Block:
         Longest integration step [s].
     covers : str
         Blocks of the rig that it stands for, in words.
-    beside : tuple of str
+    simulated : tuple of str
         Kinds of block that it simulates as well, since nobody measured them: a regulator whose
         outlet has no gauge.
     tubes : tuple of Tube
@@ -155,7 +155,7 @@ class Block:
     parameters: frozenset[str]
     step: float
     covers: str
-    beside: tuple[str, ...] = ()
+    simulated: tuple[str, ...] = ()
     tubes: tuple[Tube, ...] = ()
     thermometer: str = ""
     anchor: float | None = None
@@ -231,8 +231,8 @@ class _FlowPath:
 
 
 def _flow_paths(rig: Rig, has: frozenset[str]) -> list[_FlowPath]:
-    """All flow paths of the air; a valve and the line behind it are one, unless a gauge stands
-    between them.
+    """All flow paths of the air; a valve and the line behind it are one, unless a gauge is between
+    them.
     """
     valves, lines = rig.ports("valve"), rig.ports("line")
     cut = {n: not e["from"] and dotted("line_pressure", n) in has for n, e in lines.items()}
@@ -555,7 +555,7 @@ class _BlockMap:
             drives=(*chamber.drives, chamber.channel),
             window=None,
             covers="gas" + _called(name),
-            beside=("chamber", *chamber.beside),
+            simulated=("chamber", *chamber.simulated),
             anchor=chamber.window,
         )
 
@@ -587,7 +587,7 @@ class _BlockMap:
         )
 
     def inlet(self, name: str) -> Block | Unjudged | None:
-        """The block of a valve alone: what it feeds into a line at whose inlet a gauge stands."""
+        """The block of a valve alone: what it feeds into a line at whose inlet there is a gauge."""
         full = qualified("line", name)
         if self.pressure(full) not in self.has or not self.commands(full):
             return None
@@ -688,11 +688,11 @@ def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
 
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the
     measured channels next to it, with the baseline parameters of what it stands for; so is a valve
-    where a gauge stands between it and the line behind it, beside the chamber, which is driven from
-    the valve on where that can be; so are muscles whose force (or torque at a joint) is measured,
-    and a gas that has a temperature of its own and a thermometer. A rig with joints or a load and
-    without valves and supplies is driven by the pressures of its muscles: these are given, and only
-    what they move is judged.
+    where a gauge is between it and the line behind it, in addition to the chamber, which is driven
+    from the valve on where that can be; so are muscles whose force (or torque at a joint) is
+    measured, and a gas that has a temperature of its own and a thermometer. A rig with joints or a
+    load and without valves and supplies is driven by the pressures of its muscles: these are given,
+    and only what they move is judged.
 
     Parameters
     ----------
@@ -813,8 +813,8 @@ def averaged(recording: Recording, count: int) -> Recording:
     Returns
     -------
     Recording
-        With the commands of the log beside their means: a valve lets through what its openings do
-        one after the other, not what their mean does.
+        With the commands of the log in addition to their means: a valve lets through what its
+        openings do one after the other, not what their mean does.
     """
     if count == 1:
         return recording

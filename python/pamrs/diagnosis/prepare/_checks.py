@@ -85,7 +85,7 @@ class Found(NamedTuple):
     faulty: Sequence[Faulty] = ()
 
 
-Look = Callable[[Case, DiagnosisSettings], Found]
+Evidence = Callable[[Case, DiagnosisSettings], Found]
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Check:
         with yes.
     action : Action
         What is done where it is not.
-    look : callable
+    evidence : callable
         Evidence that a case gives. A check that leaves recordings out is asked of each by itself.
     of_rig : bool
         True where a recording with such evidence cannot be of the rig: asked on import, too, and
@@ -107,20 +107,20 @@ class Check:
     prepared : bool
         True where recordings that are ready to be fitted are needed.
     repeats : Action
-        Sentences of checks with this action stand below a refusal: they may explain it.
+        Sentences of checks with this action are printed below a refusal: they may explain it.
     """
 
     name: str
     channels: str
     question: str
     action: Action
-    look: Look
+    evidence: Evidence
     of_rig: bool = False
     prepared: bool = False
     repeats: Action = Action.DOUBT
 
 
-def _each(evidence: Callable[[Recording, Rig, DiagnosisSettings], Iterable[str]]) -> Look:
+def _each(evidence: Callable[[Recording, Rig, DiagnosisSettings], Iterable[str]]) -> Evidence:
     """Evidence of all recordings of a case from that of one; empty texts are none."""
     return lambda case, settings: Found(
         [text for r in case.recordings for text in evidence(r, case.rig, settings) if text]
@@ -129,16 +129,16 @@ def _each(evidence: Callable[[Recording, Rig, DiagnosisSettings], Iterable[str]]
 
 def _mended(
     mend: Callable[[Case, DiagnosisSettings], tuple[list[Recording], Sequence[str | Faulty]]],
-) -> Look:
+) -> Evidence:
     """Evidence, and the case with the recordings that are left, from what gives both."""
 
-    def look(case: Case, settings: DiagnosisSettings) -> Found:
+    def evidence_of(case: Case, settings: DiagnosisSettings) -> Found:
         recordings, evidence = mend(case, settings)
         faulty = [one for one in evidence if isinstance(one, Faulty)]
         texts = [one for one in evidence if isinstance(one, str)]
         return Found(texts, replace(case, recordings=recordings), faulty)
 
-    return look
+    return evidence_of
 
 
 def _unforced(case: Case, _: DiagnosisSettings) -> Found:
@@ -396,7 +396,7 @@ class Ready:
         Blocks of the rig that its channels surround.
     suspected, doubts : list of str
         What was left out and why; units and columns to be looked at.
-    told, masked : list of str
+    notes, masked : list of str
         What is no proof or taken as known; and samples that were masked.
     faulty : list of Faulty
         Sensors and commands that are dead or at the end of their range.
@@ -406,7 +406,7 @@ class Ready:
     blocks: list[Block]
     suspected: list[str]
     doubts: list[str]
-    told: list[str]
+    notes: list[str]
     masked: list[str]
     faulty: list[Faulty]
 
@@ -433,7 +433,7 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
                 said[action] += texts
                 continue
             for check in checks:
-                found = check.look(case, settings)
+                found = check.evidence(case, settings)
                 if action is Action.REFUSE and found.texts:
                     raise DiagnosisError(found.texts[0])
                 case = case if found.case is None else found.case
@@ -460,7 +460,7 @@ def _without_faulty(
     faults: dict[str, list[str]] = {}
     for recording in case.recordings:
         one = replace(case, recordings=[recording])
-        if texts := [text for check in checks for text in check.look(one, settings).texts]:
+        if texts := [text for check in checks for text in check.evidence(one, settings).texts]:
             faults[recording.name] = texts
     rest, said = left_out(case, {name: "; ".join(texts) for name, texts in faults.items()})
     if faults and not said and checks[0].action is Action.LEAVE_OUT_OR_REFUSE:
@@ -487,8 +487,8 @@ def implausible(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> 
         One line for each finding; empty for a sound recording.
     """
     case = Case(recording.name, rig, [recording], Path())
-    looks = [check.look for check in _BEFORE if check.of_rig]
-    return [text for look in looks for text in look(case, settings).texts]
+    sources = [check.evidence for check in _BEFORE if check.of_rig]
+    return [text for evidence in sources for text in evidence(case, settings).texts]
 
 
 def check_sense(
@@ -700,7 +700,7 @@ AMBIENT_PRESSURE = "ambient_pressure"
 """Used where a recording is read: it makes absolute pressures gauge pressures."""
 _NAME = "gas.temperature"
 _SAME = 0.1
-"""Temperatures that differ by less are told as the same [K]."""
+"""Temperatures that differ by less are reported as the same [K]."""
 
 
 def _rooms(recordings: Sequence[Recording]) -> list[tuple[str, float]]:
@@ -805,8 +805,8 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
     """Recordings without the samples that a sensor reads at the end of its range.
 
     A sensor ends where it ends: the end that one recording shows, by staying there for long, is
-    that of all of them, and a sample there may be of anything beyond. Samples beside one are those
-    of which the noise let through the lower half, and go with it.
+    that of all of them, and a sample there may be of anything beyond. Samples next to such a one
+    are those of which the noise let through the lower half, and go with it.
 
     Returns
     -------
@@ -840,7 +840,7 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
     return masked, faults
 
 
-def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> Mask:
+def _beyond(recording: Recording, channel: str, rail: float, neighbours: int) -> Mask:
     """Samples of a channel at the end of its range, with their neighbours; those that are masked
     because they stay there included.
     """
@@ -856,7 +856,7 @@ def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> Mas
             # what is reported of several stretches together lies anywhere between its ends
             between = (recording.time >= issue.start) & (recording.time <= issue.stop)
             at_end |= between & ~mask
-    bad: Mask = binary_dilation(at_end, iterations=beside) if at_end.any() else at_end
+    bad: Mask = binary_dilation(at_end, iterations=neighbours) if at_end.any() else at_end
     return bad
 
 

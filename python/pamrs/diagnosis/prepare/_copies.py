@@ -1,13 +1,14 @@
 """Recordings that hold the same samples: a copy is no proof.
 
 Repeated commands give the same signals again, but not the same noise. Two recordings share content
-where one tells the other's samples better than any sample is told by its own neighbours: then its
+where one predicts the other's samples better than its own neighbours predict any sample: then its
 noise is the same, and not its command alone.
 
-A channel's deviations are what its own neighbours do not tell of a sample: of a smooth signal its
-noise, whatever the signal is. Those of a repetition are independent of one another. Those of a copy
-go together at one alignment, however it was filtered, thinned, shifted, reversed or covered by more
-noise. Where the steps of a converter are far wider than the noise, its flips stand in their place.
+A channel's deviations are what its own neighbours do not predict of a sample: of a smooth signal
+its noise, whatever the signal is. Those of a repetition are independent of one another. Those of a
+copy go together at one alignment, however it was filtered, thinned, shifted, reversed or covered by
+more noise. Where the steps of a converter are far wider than the noise, its flips are compared
+instead.
 """
 
 from __future__ import annotations
@@ -41,12 +42,12 @@ class Overlap:
     Attributes
     ----------
     own, other : (start, stop)
-        From when to when in the recording and in the other one [s].
+        From when to when in the recording and in the other recording [s].
     share : float
         Share of the recording's time.
     free : tuple of (start, stop)
-        Stretches of the recording that are not in the other one [s]: beyond its ends, or with noise
-        that it does not tell. Where nothing can be told, the samples count as shared.
+        Stretches of the recording that are not in the other recording [s]: beyond its ends, or with
+        noise that it does not predict. Where nothing can be decided, the samples count as shared.
     """
 
     own: tuple[float, float]
@@ -213,10 +214,10 @@ def _shared_mask(alignment: _SharedRows) -> Mask:
     for first, last in stretches(alignment.other):
         new_rows[first:last] = last - first >= LEAST_SAMPLES
     for first, last in stretches(~new_rows & ~shared & alignment.inside):
-        beside = new_rows[[k for k in (first - 1, last) if 0 <= k < new_rows.size]]
+        neighbours = new_rows[[k for k in (first - 1, last) if 0 <= k < new_rows.size]]
         # what cannot be told is new where noise of its own is on both sides; so is part of a window
         part = last - first < WINDOW_SAMPLES
-        new = beside.any() if part else beside.size == 2 and beside.all()
+        new = neighbours.any() if part else neighbours.size == 2 and neighbours.all()
         shared[first:last] = not new
     return shared
 
@@ -268,7 +269,7 @@ WINDOW_SAMPLES = 64
 LEAST_SAMPLES = 192  # samples that are shared at the least: three windows
 _LAGS = 8  # shifts in time that are looked at
 # neighbours on either side by which a sample is told without the other recording
-_BESIDE_SAMPLES = 4
+_NEIGHBOURS = 4
 # samples of a block that is looked for in a recording whose clock goes otherwise
 _BLOCK_SAMPLES = 256
 
@@ -292,7 +293,7 @@ class _Alignment:
     Attributes
     ----------
     rate, lag : float
-        The sample at a time t [s] is at ``rate t + lag`` [s] of the other one [1, s].
+        The sample at a time t [s] is at ``rate t + lag`` [s] of the other recording [1, s].
     mean : bool
         Whether it is a mean of samples there.
     """
@@ -307,7 +308,7 @@ class _Alignment:
 
 
 class _SharedRows(NamedTuple):
-    """Rows of the slower of two recordings at an alignment: those that lie in the other one, those
+    """Rows of the slower of two recordings at an alignment: those that lie in the faster one, those
     in which some channel's deviations are the same, and those in which all channels that show
     anything differ.
     """
@@ -380,16 +381,14 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     """Channel with the deviation of each sample from what its neighbours predict."""
     index = np.arange(values.size)
     nothing = np.zeros(values.size)
-    if known.sum() < 4 * _BESIDE_SAMPLES or not np.ptp(values[known]) > 0.0:
+    if known.sum() < 4 * _NEIGHBOURS or not np.ptp(values[known]) > 0.0:
         return _Deviations(nothing, known, nothing, 0.0)
     filled = values if known.all() else np.interp(index, index[known], values[known])
-    centred, offsets = filled - filled.mean(), np.r_[-_BESIDE_SAMPLES:0, 1 : _BESIDE_SAMPLES + 1]
-    inner = known & (index >= _BESIDE_SAMPLES) & (index < values.size - _BESIDE_SAMPLES)
+    centred, offsets = filled - filled.mean(), np.r_[-_NEIGHBOURS:0, 1 : _NEIGHBOURS + 1]
+    inner = known & (index >= _NEIGHBOURS) & (index < values.size - _NEIGHBOURS)
     flat = np.diff(centred) == 0.0
     moves = inner & ~(np.r_[False, flat] & np.r_[flat, False])
-    counted = (
-        moves if moves.sum() > 4 * _BESIDE_SAMPLES else inner
-    )  # a rest says nothing of the noise
+    counted = moves if moves.sum() > 4 * _NEIGHBOURS else inner  # a rest says nothing of the noise
     use, deviations, weights = counted, centred, np.zeros(offsets.size)
     for _ in range(4):  # steps of the signal do not say how noise is told
         if use.sum() < 2 * offsets.size:
@@ -405,7 +404,7 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     if not size > 1e-12 * float(np.abs(centred).max()):
         return _Deviations(filled, known, nothing, coarse)
     # a step of the signal is left in all samples beside it
-    steps = uniform_filter1d((counted & ~use).astype(float), 4 * _BESIDE_SAMPLES + 1) > 1e-6
+    steps = uniform_filter1d((counted & ~use).astype(float), 4 * _NEIGHBOURS + 1) > 1e-6
     return _Deviations(filled, known, np.where(inner & ~steps, deviations / size, 0.0), coarse)
 
 
@@ -473,8 +472,8 @@ def _clocks(
     slow_channels: dict[str, _Deviations],
     fast_channels: dict[str, _Deviations],
 ) -> Iterator[tuple[float, float]]:
-    """Rates of the slower recording's clock in the other one, and times from which they run [1, s]:
-    as both say; backwards; sample by sample; as blocks of it are found there.
+    """Rates of the slower clock in the faster one, and times from which they run [1, s]: as both
+    say; backwards; sample by sample; as blocks of it are found there.
     """
     yield 1.0, 0.0
     yield -1.0, fast.duration
@@ -530,7 +529,7 @@ def _alignments_at(
     channels: tuple[dict[str, _Deviations], dict[str, _Deviations]],
     alignment: _Alignment,
 ) -> Iterator[_SharedRows]:
-    """Alignments of one rate at which some channel's deviations are those of the other one."""
+    """Alignments of one rate at which some channel's deviations agree in both recordings."""
     slow_channels, fast_channels = channels
     step = alignment.rate * slow.sample_time
     count = int(fast.duration / abs(step) + 1.5)
@@ -567,7 +566,7 @@ def _single(values: Array) -> NDArray[np.float32]:
 
 
 def _lags(a: _Deviations, b: _Deviations) -> dict[int, float]:
-    """Rows by which one channel may run behind in the other one, and the correlation of their
+    """Rows by which one channel may run behind in the other recording, and the correlation of their
     deviations where these go together there and nowhere else, 0 elsewhere: a command that is
     repeated has its periods too.
     """
@@ -588,8 +587,8 @@ def _lags(a: _Deviations, b: _Deviations) -> dict[int, float]:
             peak = float(peaks[place])
             if not peak > 0.0:
                 break
-            beside = np.arange(place - WINDOW_SAMPLES, place + WINDOW_SAMPLES + 1)
-            peaks[beside % length] = 0.0
+            around = np.arange(place - WINDOW_SAMPLES, place + WINDOW_SAMPLES + 1)
+            peaks[around % length] = 0.0
             alone = peak > max(_LEAST_PEAK, _PEAK_RATIO * float(peaks.max()))
             lag = place if place < other.size else place - length
             noise_alone = most == 1 and alone and not (a.step and b.step)
@@ -599,7 +598,7 @@ def _lags(a: _Deviations, b: _Deviations) -> dict[int, float]:
 
 
 def _by_window(a: _Deviations, b: _Deviations) -> tuple[Mask, Mask, bool]:
-    """Rows about which the deviations of one channel follow those of the other one, rows about
+    """Rows about which the deviations of one channel follow those of the other channel, rows about
     which they do not, and whether the two differ so clearly that windows can be told apart.
     """
     wanted = a.deviations
@@ -665,8 +664,8 @@ def _between(
     other: dict[str, _Deviations],
 ) -> Iterator[_SharedRows]:
     """Samples of one run that were dealt out to two recordings: those of one lie at a whole
-    fraction between those of the other one and differ by noise alone, and no command that is
-    repeated made both.
+    fraction between those of the second and differ by noise alone, and no command that is repeated
+    made both.
     """
     dt = slow.sample_time
     if abs(dt - fast.sample_time) > 1e-3 * dt or _repeats(slow, fast):

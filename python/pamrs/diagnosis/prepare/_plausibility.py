@@ -587,7 +587,7 @@ def without_dead_commands(
     """Recordings without commands of one value that the pressures behind them contradict.
 
     The channel is left out, where what moves can be judged by its gauges alone; a recording with
-    such a command beside others without one is left out instead, so that these keep their valve.
+    such a command among others without one is left out instead, so that these keep their valve.
 
     Returns
     -------
@@ -664,8 +664,8 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         prepared.recording.channels[block.channel][rows],
         predicted(block, core, prepared)[rows],
     )
-    quiet = float(np.std(measured)) < _SENSE_LEAST_NOISES * prepared.noise[block.channel]
-    if quiet or _misfit(measured, model) < _SENSE_WRONG:
+    still = float(np.std(measured)) < _SENSE_LEAST_NOISES * prepared.noise[block.channel]
+    if still or _misfit(measured, model) < _SENSE_WRONG:
         return None
     signals, name = prepared.signals, block.channel
     value, slope = signals[name]

@@ -386,7 +386,7 @@ def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array
     return columns
 
 
-def _beside_starts(columns: list[Array], starts: list[tuple[int, int, Array]]) -> Array:
+def _without_starts(columns: list[Array], starts: list[tuple[int, int, Array]]) -> Array:
     """Orthonormal columns (n, k) that are free in a whole recording, without what the starts of its
     windows can do.
     """
@@ -491,7 +491,8 @@ def residual(
     parameters : list of str
         Dotted names for the jacobian, may be empty.
     given : Input, optional
-        An input of the block beside what its model makes; the residual then has a `response`.
+        An input of the block in addition to what its model makes; the residual then has a
+        `response`.
     """
     core = _core_of_recording(core, prepared)
     starts = prepared.starts(block.window, block.drives)
@@ -520,7 +521,7 @@ def residual(
     not_freed = Residual(value, None, prediction, rows, prepared.noise[block.channel])
     freed = _freed_of_starts(block, prepared, not_freed, starts, columns, slopes)
     every = [*_levels(block, core, prepared, prediction), *free]
-    of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], freed.starts)
+    of_recording = _without_starts([np.where(rows, v, 0.0) for v in every], freed.starts)
     if of_recording.size:
         taken = of_recording @ (of_recording.T @ freed.value)
         slopes -= of_recording @ (of_recording.T @ slopes)

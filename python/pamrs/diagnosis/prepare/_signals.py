@@ -29,7 +29,7 @@ _SPECTRUM_SAMPLES = 64
 # spectra without a sample that was left out, from which bands are compared (decision 22)
 _LEAST_SPECTRA = 16
 # variance share below which the quietest band is the noise: white noise has 0.38 (decision 22)
-_QUIET_SHARE = 0.25
+_BAND_SHARE = 0.25
 # [s] stretches beside a start that give value and slope; the longest that fits (decision 22)
 _START_REACHES = (0.04, 0.08, 0.16)
 # variance over that of the noise up to which a cubic fits such a stretch (decision 22)
@@ -59,7 +59,7 @@ _TERMS = 4
 """Terms of a cubic."""
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
-"""Channels at which a rig is cut; of a block with a name its name stands behind it."""
+"""Channels at which a rig is cut, without the names of blocks."""
 DRIVEN_COMMANDS = with_trait("driven")
 
 
@@ -279,11 +279,11 @@ def noise_level(values: Array, mask: Mask, *, seed: int) -> float:
     # brings smears them, and is taken off
     dithered = values + np.random.default_rng(seed).uniform(-0.5, 0.5, values.size) * lattice
     variance = (1.4826 * float(np.median(np.abs(np.diff(dithered, 3)[ok])))) ** 2 / 20.0
-    quiet = _quietest_band(values, mask)
-    if quiet < _QUIET_SHARE * variance:
+    least = _quietest_band(values, mask)
+    if least < _BAND_SHARE * variance:
         # what jumps from sample to sample shows no small step in time, and a finer lattice
         finer = _lattice(np.unique(values[mask])) if rounded else 0.0
-        return float(np.sqrt(max(quiet, finer**2 / 12.0)))
+        return float(np.sqrt(max(least, finer**2 / 12.0)))
     return float(np.sqrt(max(variance - lattice**2 / 12.0, lattice**2 / 12.0)))
 
 
@@ -545,8 +545,8 @@ def _looked_at(recording: Recording, rig: Rig, core: _core.Rig) -> list[str]:
     it does not have is left alone.
     """
     drives = [name for name in core.channels if channel_of(name) in DRIVES]
-    beside = (pulls_of(rig), thermometers_of(rig), flows_of(rig))
-    every = (*drives, *(name for channels in beside for name in channels.values()))
+    outputs = (pulls_of(rig), thermometers_of(rig), flows_of(rig))
+    every = (*drives, *(name for channels in outputs for name in channels.values()))
     return [name for name in every if name in recording.channels]
 
 

@@ -4,8 +4,8 @@ first.
 An effect at a typical size changes the residuals by a signature. What the baseline parameters
 (inside their tolerances) and the starts of the windows can do is projected out of the signature and
 of the residual; what is left of the residual along what is left of the signature is the gain in
-chi-square that the effect would bring (a score test, Rao 1948, with a finite change in the place of
-the derivative, since many effects have none at zero).
+chi-square that the effect would bring (a score test, Rao 1948, with a finite change instead of the
+derivative, since many effects have none at zero).
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class Screen:
         tangent : Tangent, optional
             Another model than the screen's own (a fitted effect).
         without : tuple of Term
-            Effects to leave out, with those that cannot act beside them.
+            Effects to leave out, with those that cannot act with them.
         """
         space = self.tangent if tangent is None else tangent
         scores = []
@@ -310,11 +310,11 @@ class _SignatureSearch:
             for start in _moved_to_action(starts, self.problem, self.fitted.rig):
                 self.add_signature(start)
 
-    def add_signature(self, start: Start, looks: int | None = None) -> float:
+    def add_signature(self, start: Start, most: int | None = None) -> float:
         """Add the signature of a start; return its gain in chi-square (minus infinity: none)."""
         everywhere = self.everywhere.get(_values(start)) if start.effect.at else None
         start_tried, best = start if everywhere is None else everywhere.moved(start.effect), None
-        for _ in range(_MOST_SIGNATURES if looks is None else looks):
+        for _ in range(_MOST_SIGNATURES if most is None else most):
             shown = self._signature_of(start_tried)
             if shown is None:
                 break
@@ -333,7 +333,7 @@ class _SignatureSearch:
             if wanted == start_tried:
                 break  # its bounds hold it
             start_tried = wanted
-        if self.strong and start.scalable and looks is None and everywhere is None:
+        if self.strong and start.scalable and most is None and everywhere is None:
             others = [self._signature_of(start.scaled(size)) for size in STRONG_SIZES]
             # what a signature says of other sizes than its own is not relied on
             known = [shown for shown in (best, *others) if shown is not None]
@@ -413,9 +413,9 @@ def _moved_to_action(starts: list[Start], problem: Problem, rig: Rig) -> list[St
     effect = starts[0].effect
     info = effect.info
     parameters = info.form(starts[0].form).parameters
-    beside = next((p for p in parameters if p.like), None)
-    if beside is not None:
-        return _restrictions_like(starts, beside, problem, rig)
+    opening = next((p for p in parameters if p.like), None)
+    if opening is not None:
+        return _restrictions_like(starts, opening, problem, rig)
     place = next((p for p in parameters if p.role == "place"), None)
     reached = None if place is None else _measured(problem, place.channel)
     if place is None or reached is None:

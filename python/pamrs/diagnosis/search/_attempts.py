@@ -73,7 +73,7 @@ _SCATTER_STDS = 2.0
 _LEAST_STEP_SHARE = 0.2
 _MOST_TURNS = 3  # in which events and the effects beside them are fitted in turn
 _LEAST_TURN = 0.8  # share of the sum of squares above which a further turn is not worth it
-_EVALUATIONS_BESIDE = 6  # evaluations of the fit of persistent effects beside events that stay
+_EVALUATIONS_WITH_EVENTS = 6  # evaluations of the fit of persistent effects beside events that stay
 _FIRST_EVALUATIONS = 5  # evaluations of such a fit (decision 13)
 # evaluations of a freed parameter's first fit: is it worth a whole one (decision 25)
 _WRONG_PARAMETERS_FIRST_EVALUATIONS = 6
@@ -164,37 +164,39 @@ class Attempts:
         """Starts of another fit from each effect of a candidate."""
         return [self.start_of(candidate.fit, effect) for effect in candidate.effects]
 
-    def fit_events(self, effect: Term, beside: FittedHypothesis) -> FittedHypothesis | None:
+    def fit_events(self, effect: Term, candidate: FittedHypothesis) -> FittedHypothesis | None:
         """Fit an effect with times of its own in every recording, next to a candidate's effects."""
-        if effect.id in {e.id for e in beside.effects}:
+        if effect.id in {e.id for e in candidate.effects}:
             return None  # it would replace what it is to happen beside
-        if beside.fit.events is not None or beside.wrong:
+        if candidate.fit.events is not None or candidate.wrong:
             return None  # what happens beside other events, or wrong values, is not fitted
         stiffest = _LEAST_STEP_SHARE * self.fit_problem.core.stable_step
-        if core_rig(beside.fit.rig, self.fit_problem.core).stable_step < stiffest:
+        if core_rig(candidate.fit.rig, self.fit_problem.core).stable_step < stiffest:
             return None  # it would take too long
-        return self._attempt((*beside.terms, effect), lambda: self._fit_events(effect, beside))
+        return self._attempt(
+            (*candidate.terms, effect), lambda: self._fit_events(effect, candidate)
+        )
 
-    def _fit_events(self, effect: Term, beside: FittedHypothesis) -> FittedHypothesis | None:
+    def _fit_events(self, effect: Term, candidate: FittedHypothesis) -> FittedHypothesis | None:
         no_inflation = self.no_inflation
-        model = with_effects_of(self.nominal, beside.fit.rig, self.nominal_effects)
-        fitted = fit_events(effect, self.fit_problem, model, beside.fit, no_inflation)
+        model = with_effects_of(self.nominal, candidate.fit.rig, self.nominal_effects)
+        fitted = fit_events(effect, self.fit_problem, model, candidate.fit, no_inflation)
         if fitted is None:
             return None
-        if beside.effects:
-            fitted = self._fit_in_turn(fitted, beside, no_inflation)
-        effects = (*beside.effects, effect)
+        if candidate.effects:
+            fitted = self._fit_in_turn(fitted, candidate, no_inflation)
+        effects = (*candidate.effects, effect)
         if self.nothing_held_out:
             return self.assess(effects, fitted)
         bare = without_term(fitted.rig, effect)
-        quiet = residuals(self.held_out_problem, bare)
+        without = residuals(self.held_out_problem, bare)
         form = fitted.events.form if fitted.events else ""
         known = {n: fitted.values[f"{effect}.{n}"] for n in effect.info.form(form).shared}
         events = look_for_events(
-            effect, self.held_out_problem, bare, quiet, no_inflation, known, form
+            effect, self.held_out_problem, bare, without, no_inflation, known, form
         )
         if events is None:
-            return self.assess(effects, fitted, quiet)
+            return self.assess(effects, fitted, without)
         everywhere = replace(
             fitted,
             events=replace(
@@ -207,48 +209,49 @@ class Attempts:
         )
 
     def _fit_in_turn(
-        self, fitted: Fit, beside: FittedHypothesis, inflation: dict[str, float]
+        self, fitted: Fit, candidate: FittedHypothesis, inflation: dict[str, float]
     ) -> Fit:
-        """Refit the persistent effects of a candidate beside its events, then look for the events
-        anew beside these, as long as either leaves much less: effects that were fitted without the
+        """Refit the persistent effects of a candidate with its events, then look for the events
+        anew with these, as long as either leaves much less: effects that were fitted without the
         events had followed them.
         """
-        last = self._refit_around_events(fitted, beside, inflation)
+        last = self._refit_around_events(fitted, candidate, inflation)
         for _ in range(_MOST_TURNS):
             assert last.events is not None
             bare = without_term(last.rig, last.events.effect)
             model = with_effects_of(self.nominal, bare, self.nominal_effects)
-            found = residuals(self.fit_problem, bare, list(beside.fit.moved))
-            known = replace(last, effects=beside.effects, rig=bare, residuals=found, events=None)
+            found = residuals(self.fit_problem, bare, list(candidate.fit.moved))
+            known = replace(last, effects=candidate.effects, rig=bare, residuals=found, events=None)
             again = fit_events(last.events.effect, self.fit_problem, model, known, inflation)
             if again is None:
                 return last
             before = last
-            last = self._refit_around_events(again, replace(beside, fit=known), inflation)
+            last = self._refit_around_events(again, replace(candidate, fit=known), inflation)
             if last.cost > _LEAST_TURN * before.cost:
                 return min(last, before, key=lambda one: one.cost)
         return last
 
     def _refit_around_events(
-        self, fitted: Fit, beside: FittedHypothesis, inflation: dict[str, float]
+        self, fitted: Fit, candidate: FittedHypothesis, inflation: dict[str, float]
     ) -> Fit:
         """Refit the persistent effects of a candidate while the events stay as they are."""
         assert fitted.events is not None
         effect = fitted.events.effect
         warm = replace(
-            beside.fit, values=beside.fit.values | {n: fitted.values[n] for n in beside.fit.moved}
+            candidate.fit,
+            values=candidate.fit.values | {n: fitted.values[n] for n in candidate.fit.moved},
         )
         again = self._fit(
-            self.starts_of(beside),
+            self.starts_of(candidate),
             inflation,
             warm,
             events=fitted.events,
-            evaluations=_EVALUATIONS_BESIDE,
+            evaluations=_EVALUATIONS_WITH_EVENTS,
         )
         names = [n for n in fitted.values if effect_of(n) == effect]
         return replace(
             again,
-            effects=(*beside.effects, effect),
+            effects=(*candidate.effects, effect),
             rig=fitted.events.put_into(again.rig, next(iter(fitted.events.values))),
             values=again.values | {n: fitted.values[n] for n in names},
             std=again.std | {n: fitted.std[n] for n in names},

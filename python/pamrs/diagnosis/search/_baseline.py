@@ -166,8 +166,8 @@ def _as_the_others(problem: Problem, nominal: Rig, inflation: dict[str, float], 
     if len(others.recordings) < _LEAST_OTHERS:
         return fitted
     alone = thorough(others, nominal, inflation, None)
-    beside, _ = stacked(others, fitted.residuals, inflation)
-    if float(beside @ beside) < _DRAGGED * 2.0 * alone.cost:
+    of_others, _ = stacked(others, fitted.residuals, inflation)
+    if float(of_others @ of_others) < _DRAGGED * 2.0 * alone.cost:
         return fitted
     return fit(problem, nominal, (), {}, inflation, warm=alone, evaluations=1)
 

@@ -72,7 +72,7 @@ class _Choice:
     shapes : dict of str to float
         Dotted shapes of the memories that they need.
     shift : (b,) array
-        What the baseline parameters move beside them, in tolerances.
+        What the baseline parameters move with them, in tolerances.
     """
 
     values: dict[str, float]
@@ -121,7 +121,7 @@ def find_closure(
     Returns
     -------
     Fit or None
-        Model with the closure (effects ``closure_*``), baseline refitted beside it; None where no
+        Model with the closure (effects ``closure_*``), baseline refitted with it; None where no
         term is worth its price.
 
     Raises

@@ -30,31 +30,31 @@ def fit_considered(search: Search) -> list[FittedHypothesis]:
     return fitted
 
 
-def _add_effect(search: Search, beside: FittedHypothesis, effect: Term) -> FittedHypothesis | None:
+def _add_effect(search: Search, base: FittedHypothesis, effect: Term) -> FittedHypothesis | None:
     """Add an effect to a set, from the start of each form that leaves least in a few steps."""
     info, attempts = effect.info, search.attempts
-    if beside.fit.events is not None:
+    if base.fit.events is not None:
         return None  # beside events nothing else is fitted
     if not info.lasting:
-        return attempts.fit_events(effect if info.own else Term(effect.id), beside)
-    starts = attempts.starts_of(beside)
+        return attempts.fit_events(effect if info.own else Term(effect.id), base)
+    starts = attempts.starts_of(base)
     short: dict[str, list[FittedHypothesis]] = {}
-    for one in _possible_starts(search, beside, effect):
-        candidate = attempts.fit_shortly([*starts, one], beside.fit, beside.wrong)
+    for one in _possible_starts(search, base, effect):
+        candidate = attempts.fit_shortly([*starts, one], base.fit, base.wrong)
         if candidate is not None:
             short.setdefault(one.form, []).append(candidate)
     near = (max(candidate, key=search.weight) for candidate in short.values())
     ended = [attempts.fit_together(attempts.starts_of(best), best.fit, best.wrong) for best in near]
     if info.transient:
-        ended.append(attempts.fit_events(Term(effect.id), beside))
+        ended.append(attempts.fit_events(Term(effect.id), base))
     return max((c for c in ended if c is not None), key=search.weight, default=None)
 
 
-def _possible_starts(search: Search, beside: FittedHypothesis, effect: Term) -> list[Start]:
+def _possible_starts(search: Search, base: FittedHypothesis, effect: Term) -> list[Start]:
     """Starts of an effect next to a set: those of the screen, which knows resonances and places of
     contact, and those of the catalogue in several sizes.
     """
-    _, ranked = search.rank(beside)
+    _, ranked = search.rank(base)
     usual = starts_of(effect, sealed=search.attempts.nominal.model["valve"] is None)
     return [
         *(score.start.scaled(score.size) for score in ranked.get(effect, [])),

@@ -3,10 +3,10 @@ is read.
 
 A wrong unit is a factor of a short list, a wrong zero of a pressure is one atmosphere: an effect or
 a wrong parameter has no reason to look like either. Each way to read each channel, and all channels
-of a kind at once, is judged by what the refitted baseline then leaves in all blocks together. It
-is believed where it takes nearly all that is above the noise, and where a factor (or an offset)
-that is free would be the one of the list. Of factors of a few per cent parameters inside their
-tolerances take up most: such a one is believed where the sum of squares clearly falls to no more
+of a kind at once, is judged by what the refitted baseline then leaves in all blocks together. It is
+believed where it takes nearly all that is above the noise, and where a factor (or an offset) that
+is free would be the one of the list. Of factors of a few per cent parameters inside their
+tolerances absorb most: such a one is believed where the sum of squares clearly falls to no more
 than noise, and a free factor is the one of the list within its standard error. The gain of a sensor
 would look the same.
 """
@@ -211,9 +211,9 @@ def _fit_reading(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> 
 def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
     """A reading by a factor of a few per cent, where the recordings ask for it.
 
-    Parameters inside their tolerances take up most of what it misses, and what it takes is less
-    than noise from bin to bin: asked is the sum of squares, priors included, as the parameters
-    follow the factor. Beside physics that is missing it is not told.
+    Parameters inside their tolerances absorb most of what it misses, and what it takes is less than
+    noise from bin to bin: asked is the sum of squares, priors included, as the parameters follow
+    the factor. Where physics is missing too it is not reported.
     """
     reread = reading.read(problem)
     beyond = replace(reading, factors=tuple(factor**2 for factor in reading.factors)).read(problem)

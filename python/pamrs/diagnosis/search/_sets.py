@@ -41,7 +41,7 @@ _PARTNER_SHARE = 0.01  # least predicted gain of a partner, as a share of the mi
 # share left alone for a fit with the best effects: it takes a fifth (decision 103)
 _TELLING_LEFT = 0.8
 # share left by the best persistent effect that asks for transient ones (decision 20)
-_TRANSIENT_BESIDE = 0.08
+_LEFT_FOR_TRANSIENT = 0.08
 _MUCH_LEFT = 0.5  # share of a mismatch from which an effect leaves most of it (decision 20)
 
 
@@ -121,9 +121,9 @@ def combine(
     growing = _Growing(search, roots)
     sets = [s for root in roots[:MOST_PAIRED] for s in growing.widen(root)]
     with_events = []
-    for effect, beside in _event_partners(search, singles, transient):
-        search.tell(f"looking for {effect} with {beside.effects[0]}")
-        fitted = search.attempts.fit_events(effect, beside)
+    for effect, partner in _event_partners(search, singles, transient):
+        search.tell(f"looking for {effect} with {partner.effects[0]}")
+        fitted = search.attempts.fit_events(effect, partner)
         with_events += [] if fitted is None else [fitted]
     return [*sets, *with_events, *growing.grow(sets)]
 
@@ -134,8 +134,8 @@ def with_freed_values(search: Search, single: FittedHypothesis) -> list[FittedHy
     for name in far_parameters(search.attempts, single.fit):
         search.tell(f"trying {single.hypothesis} with another {name}")
         starts = search.attempts.starts_of(single)
-        beside = search.attempts.fit_together(starts, single.fit, (name,))
-        fitted += [] if beside is None else [beside]
+        freed = search.attempts.fit_together(starts, single.fit, (name,))
+        fitted += [] if freed is None else [freed]
     return fitted
 
 
@@ -176,7 +176,8 @@ class _Growing:
     tried_sets : set of Hypothesis
         Sets that were fitted.
     likely : list of _Partner
-        What leaves least beside the single hypothesis that weighs most, which the others get too.
+        What leaves least together with the single hypothesis that weighs most, which the others get
+        too.
     """
 
     search: Search
@@ -269,8 +270,8 @@ class _Growing:
                 if not self._was_tried(base, (scores[0].effect,)):
                     yield self._begun_best(base, starts, scores)
         yield from self._telling(base)
-        strained = far_parameters(self.attempts, base.fit) if base.effects else []
-        yield from (_Partner([], (name,)) for name in strained if name not in base.wrong)
+        far = far_parameters(self.attempts, base.fit) if base.effects else []
+        yield from (_Partner([], (name,)) for name in far if name not in base.wrong)
 
     def _shortlisted(self, base: FittedHypothesis, base_starts: list[Start]) -> list[_Partner]:
         """Partners of a set: effects, of all that act, that leave least with it after a few steps.
@@ -336,8 +337,8 @@ class _Growing:
     def _telling(self, base: FittedHypothesis) -> list[_Partner]:
         """Partners that take a large share of the mismatch alone.
 
-        The signature of a strong effect beside another one is linear in what is not; where both
-        were fitted, both are known.
+        The signature of a strong effect in the presence of another one is linear in what is not;
+        where both were fitted, both are known.
         """
         telling = [
             c
@@ -376,7 +377,7 @@ def _event_partners(
     attempts, screened, start = search.attempts, search.screened, search.start
     steady = [c for c in singles if c.fit.events is None]
     best = max(steady, key=search.weight, default=start)
-    leaves_some = _TRANSIENT_BESIDE < search.share_left(best) < _MUCH_LEFT
+    leaves_some = _LEFT_FOR_TRANSIENT < search.share_left(best) < _MUCH_LEFT
     pairs = [(e, best) for e in transient] if leaves_some else []
     mismatch = float(screened.tangent.rows @ screened.tangent.rows)
     for single in singles:
@@ -388,13 +389,11 @@ def _event_partners(
             key: replace(r, jacobian=baseline_residuals[key].jacobian)
             for key, r in single.fit.residuals.items()
         }
-        beside = replace(start.fit, residuals=left_by_events, moved=single.fit.moved)
+        known = replace(start.fit, residuals=left_by_events, moved=single.fit.moved)
         least = max(LEAST_GAIN, _PARTNER_SHARE * mismatch)
         shown = [
             s
-            for s in screened.scores(
-                tangent_of(beside, attempts.fit_problem, attempts.no_inflation)
-            )
+            for s in screened.scores(tangent_of(known, attempts.fit_problem, attempts.no_inflation))
             if s.gain > least
         ]
         partner = next((c for s in shown for c in steady if c.effects == (s.effect,)), None)

@@ -44,7 +44,7 @@ _NEAR_MISFIT = 2.0
 _SUSPECTED_TOLERANCES = 1.0  # [tolerances] moved by a value whose freeing is looked at
 # [tolerances] moved by a suspect beside effects, which take a part of what it would do
 _FAR_TOLERANCES = 2.0
-_MOST_BESIDE = 2  # parameters at their wall that are freed beside the effects that leave least
+_MOST_FAR = 2  # parameters at their wall that are freed beside the effects that leave least
 _MOST_PAIRS = 2  # pairs of parameters that are fitted (decision 25)
 _PAIR_SHARE = 0.08  # share of the largest predicted gain from which a pair is fitted (decision 25)
 # wrong by one mistake: other valve and fittings, load, arm (decision 25)
@@ -158,7 +158,7 @@ def far_parameters(attempts: Attempts, fitted: Fit) -> list[str]:
         (name,) for name, moved in fitted.moved.items() if abs(moved) >= _FAR_TOLERANCES
     ]
     gains = _worth_a_fit(attempts, fitted, far, attempts.inflation_of(fitted))
-    return [name for (name,) in gains][:_MOST_BESIDE]
+    return [name for (name,) in gains][:_MOST_FAR]
 
 
 def _worth_a_fit(

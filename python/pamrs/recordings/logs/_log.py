@@ -18,7 +18,7 @@ from pamrs._files import MOST_SIZE
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.recordings._clock import TIME_UNITS
 from pamrs.recordings._gate import check_size
-from pamrs.recordings.table import NO_VALUE, Table, told_few
+from pamrs.recordings.table import NO_VALUE, Table, first_few
 from pamrs.units import measured_from, parse_unit
 
 _PAIRS: Final = {"[": "]", "(": ")", "{": "}", "<": ">"}
@@ -306,7 +306,7 @@ class TextFormat:
     delimiter, decimal, thousands : str, optional
         What separates cells (``" "``: any run of blanks), marks decimals, groups digits.
     header : bool, optional
-        Whether a row of headings stands above the numbers.
+        Whether a row of headings is above the numbers.
     columns : tuple of str, optional
         A name for each column, in order, instead of the file's own.
     """
@@ -355,7 +355,7 @@ class Log:
         Parameters
         ----------
         name : str
-            The whole path, or its end: ``p1`` for ``rig/p1``; or as the heading stands in the file,
+            The whole path, or its end: ``p1`` for ``rig/p1``; or as the heading is in the file,
             with its unit or what an earlier version left of that: ``p1_(bar)``, ``p1_``.
 
         Raises
@@ -428,7 +428,7 @@ def table_of(log: Log) -> Table:
 
 
 def _few(names: Iterable[str]) -> str:
-    return told_few(map(repr, names), most=12)
+    return first_few(map(repr, names), most=12)
 
 
 def collected(

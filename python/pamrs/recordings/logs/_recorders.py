@@ -252,7 +252,7 @@ def read_mcap(path: Path, form: TextFormat) -> Log:
 
 
 def _mcap_messages(stream: Any, unpacked: Unpacking, unread: dict[str, str]) -> _Messages:
-    """Messages of an MCAP file in the order in which they stand there."""
+    """Messages of an MCAP file in the order of the file."""
     from mcap.records import Channel, Chunk, Message, Schema
     from mcap.stream_reader import StreamReader, breakup_chunk
 
@@ -343,14 +343,14 @@ class _Topic:
         if np.all(late == 0):
             return arrived, ""
         low, middle, high = (f"{1e-6 * x:.4g}" for x in (late.min(), np.median(late), late.max()))
-        told = (
+        remark = (
             f"{name}: times are the stamps of its messages, which arrived {middle} ms later in the "
             f"middle ({low} to {high} ms); time = {{ column = '{name}/arrival' }} takes the arrival"
         )
         if abs(np.median(late)) > _OTHER_CLOCK:
             stamps += late.min()
-            told += "; the stamps are of another clock, moved so that the least delay is 0"
-        return stamps, told
+            remark += "; the stamps are of another clock, moved so that the least delay is 0"
+        return stamps, remark
 
 
 def _collected(path: Path, messages: _Messages, unread: dict[str, str]) -> Log:
@@ -368,7 +368,7 @@ def _collected(path: Path, messages: _Messages, unread: dict[str, str]) -> Log:
         raise RecordingError(f"{path}: no message with numbers was found ({why or 'it is empty'})")
     times = {name: topic.times(name) for name, topic in topics.items()}
     first = min(int(stamps.min()) for stamps, _ in times.values())
-    remarks = [told for _, told in times.values() if told]
+    remarks = [remark for _, remark in times.values() if remark]
     if remarks:
         remarks += [
             f"{name}: no stamps, times are those of arrival"
@@ -377,7 +377,7 @@ def _collected(path: Path, messages: _Messages, unread: dict[str, str]) -> Log:
         ]
     found: list[Series] = []
     for name, topic in topics.items():
-        stamps, told = times[name]
+        stamps, remark = times[name]
         clock = _seconds(stamps - first)  # subtracted before they become floating numbers
         clocks = {tuple(range(len(clock))): clock}
         for inner, numbers in topic.values.items():
@@ -386,7 +386,7 @@ def _collected(path: Path, messages: _Messages, unread: dict[str, str]) -> Log:
             array = np.array(numbers, dtype=np.float64)
             array[~np.isfinite(array)] = np.nan
             found.append(Series(inner, array, _UNITS.get(inner.rpartition("/")[2], ""), own))
-        if told:
+        if remark:
             arrival = _seconds(np.array(topic.arrived, dtype=np.int64) - first)
             found.append(Series(f"{name}/arrival", arrival, "s", clock))
     return collected(path, found, unread, remarks)

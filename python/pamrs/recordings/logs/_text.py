@@ -35,24 +35,24 @@ from pamrs.recordings.logs._log import (
     unwrapped,
 )
 from pamrs.recordings.table import (
-    BESIDE_COMMAS,
+    GROUPED_BY_POINTS,
     NO_VALUE,
     QUANTITY,
     Dialect,
     Lines,
     Table,
     dialect_of,
+    first_few,
     is_number,
     is_useful,
     joined_rows,
+    left_out_rows,
     lines_of,
     lines_of_rows,
     numbers_of_cells,
     read_text,
     same_width,
     split_rows,
-    told_few,
-    told_rows,
     usual_width,
 )
 from pamrs.units import parse_unit, same_dimension
@@ -64,7 +64,7 @@ _HEAD: Final = 5000  # rows above the table, at most
 _BEGUN: Final = 20  # rows of an earlier run that may stand above the headings
 _MOST_TEXTS: Final = 1000  # different texts of a column that can name pieces
 _MARKS: Final = {".": "points", ",": "commas"}
-_BESIDE_POINTS = re.compile(r"[-+]?(?:[1-9]\d{0,2}(?:,\d{3})+|\d{1,3})(?:\.\d+)?")
+_GROUPED_BY_COMMAS = re.compile(r"[-+]?(?:[1-9]\d{0,2}(?:,\d{3})+|\d{1,3})(?:\.\d+)?")
 _THOUSANDS = re.compile(r"[-+]?(\d{1,3}(\.\d{3})+|0)")
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]\d{2,3}(?!\d))")
 #: Keys above a table beside which the time between its samples stands.
@@ -146,7 +146,7 @@ def _log_of_lines(
     remarks: Sequence[str] = (),
     comments: Sequence[list[str]] = (),
 ) -> Log:
-    """Log of a table, with what stands above it: cells of comments may be headings."""
+    """Log of a table, with what is above it: cells of comments may be headings."""
     above = _headed(path, body, decimal, form, comments)
     rows = body.after(above.first)
     if len(rows.lines) < 2:
@@ -158,7 +158,7 @@ def _log_of_lines(
     odd = (
         {} if stamped else {k: rows.numbers[k] for k, row in parted if _is_dated(row, above.kinds)}
     )
-    left = told_rows([*odd.values()], "rows with a time of day for a number")
+    left = left_out_rows([*odd.values()], "rows with a time of day for a number")
     rows = rows.only([k for k in range(len(rows.lines)) if k not in odd])
     width = len(above.kinds)
     rows, part, said = same_width(rows, width, above.rows, str(path), strict=False)
@@ -195,7 +195,7 @@ def _headed(
         line = f"the headings are line {body.numbers[at]}"
         remarks += [f"lines above the headings: {at}, not read; {line}"] if at else []
         between = [body.numbers[k] for k in range(at, first) if head[k] not in used]
-        remarks += told_rows(between, "lines between the headings and the numbers")
+        remarks += left_out_rows(between, "lines between the headings and the numbers")
     elif not used and form.header is not False and form.columns is None:
         some = f"columns 1 to {width} have no names" if width > 1 else "its column has no name"
         number = body.numbers[min(first, len(body.lines) - 1)]
@@ -239,7 +239,7 @@ def _first_row(
 
 
 def _is_dated(row: list[str], kinds: list[str]) -> bool:
-    """True where a time of day stands in a column of numbers: the row is none of the table."""
+    """True where a time of day is in a column of numbers: the row is none of the table."""
     pairs = zip(row, kinds, strict=False)
     times = [cell for cell, kind in pairs if kind == "number" and ":" in cell]
     return any(is_moment(cell.strip()) for cell in times)
@@ -308,14 +308,14 @@ def _headings(
 
 
 def _stated_spacing(above: list[list[str]], begun: list[list[str]], decimal: str) -> float:
-    """Seconds between samples that stand beside a key above a table or in its first rows, or below
-    one above it in a row that is none of numbers; NaN for none.
+    """Seconds between samples that are written next to a key above a table or in its first rows, or
+    below one above it in a row that is none of numbers; NaN for none.
     """
-    beside = (pair for row in above + begun for pair in zip(row, row[1:], strict=False))
+    next_to = (pair for row in above + begun for pair in zip(row, row[1:], strict=False))
     rows = zip(above, above[1:], strict=False)
     said = (two for two in rows if not all(is_useful(c, decimal, None) for c in two[1] if c))
     below = (pair for two in said for pair in zip(*two, strict=False))
-    for key, value in (*beside, *below):
+    for key, value in (*next_to, *below):
         match = QUANTITY.fullmatch(value)
         if match and _SPACING.fullmatch(key.strip(" =:")):
             unit = understood_unit(match["unit"] or "s")
@@ -326,7 +326,7 @@ def _stated_spacing(above: list[list[str]], begun: list[list[str]], decimal: str
 
 
 def _spaced(found: list[Series], spacing: float, remarks: list[str]) -> list[Series]:
-    """Series with times where a column without a name rises by the spacing that stands above the
+    """Series with times where a column without a name rises by the spacing that is given above the
     table, or one counts the samples and nothing else is a clock.
     """
     words = {word for item in found for word in re.findall("[a-z]+", item.name.lower())}
@@ -373,7 +373,9 @@ def _pivoted(found: list[Series], remarks: list[str]) -> list[Series]:
         units = {each.labels[int(k)] for each in said[:1] for k in each.values[rows]}
         unit = " or ".join(sorted(units)) or unit or value.unit
         made.append(Series(called, np.where(rows, value.values, np.nan), unit))
-    remarks.append(f"{name.name} says of what {value.name} is in each row: {told_few(name.labels)}")
+    remarks.append(
+        f"{name.name} says of what {value.name} is in each row: {first_few(name.labels)}"
+    )
     return [*(item for item in found if item not in (value, name, *said)), *made]
 
 
@@ -391,7 +393,7 @@ def _times_shared(clock: Series, name: Series) -> bool:
 def _dated(
     rows: Lines, names: list[str], units: list[str], remarks: list[str]
 ) -> tuple[Lines, list[str], list[str]]:
-    """Rows, names and units with a date and the time of day beside it in one cell."""
+    """Rows, names and units with a date and the time of day next to it in one cell."""
     middle = len(rows.lines) // 2
     some = rows.rows(middle, middle + 1)
     dates = [k for row in some for k, cell in enumerate(row) if is_date(cell)]
@@ -441,7 +443,7 @@ def _column(
     if 2 * len(strange) < np.isfinite(values).sum() and not table.doubtful(place, decimal):
         odd = [table.cell(place, row) for row in strange]
         if not any("," in cell or "." in cell for cell in odd):
-            remarks += [f"{name}: {text}" for text in table.told(place, strange)]
+            remarks += [f"{name}: {text}" for text in table.strange_cells(place, strange)]
             found.append(Series(name, values, unit))
             return
     cells = [str(cell) for cell in table.cells(place)]
@@ -450,11 +452,11 @@ def _column(
             unread[name] = "it is empty"
         return
     if thousands is None and (mark := _grouped(cells, decimal)):
-        remarks += [f"{name}: {text}" for text in _told_mark(cells, mark)]
+        remarks += [f"{name}: {text}" for text in _mark_remark(cells, mark)]
         values, strange = table.read(place, mark, decimal)
     filled = sum(map(bool, cells))
     if 2 * len(strange) < filled:
-        remarks += [f"{name}: {text}" for text in table.told(place, strange)]
+        remarks += [f"{name}: {text}" for text in table.strange_cells(place, strange)]
         found.append(Series(name, values, unit))
         return
     try:
@@ -463,7 +465,7 @@ def _column(
         unread[name] = str(error)
         return
     found.append(made)
-    remarks += [f"{name}: {text}" for text in (*table.told(place, lost), *said)]
+    remarks += [f"{name}: {text}" for text in (*table.strange_cells(place, lost), *said)]
 
 
 def _of_texts(
@@ -482,7 +484,7 @@ def _of_texts(
     if units and 2 * sum(match is not None for match in matches) > sum(map(bool, cells)):
         if len(units) > 1:
             some = (f"{cells[row]!r} in row {table.row_numbers[row]}" for row in units.values())
-            raise RecordingError(f"its cells have several units: {told_few(some)}")
+            raise RecordingError(f"its cells have several units: {first_few(some)}")
         ((unit, row),) = units.items()
         if series.unit and not same_unit(series.unit, unit):
             raise RecordingError(
@@ -495,7 +497,7 @@ def _of_texts(
         mark = thousands or _grouped(numbers, decimal)
         values, lost = numbers_of_cells(numbers, mark, decimal)
         made = replace(series, values=values, unit=series.unit or unit)
-        return made, lost, _told_mark(cells, mark) if thousands is None else []
+        return made, lost, _mark_remark(cells, mark) if thousands is None else []
     if (count := len(set(cells))) > _MOST_TEXTS:
         raise RecordingError(f"it has {count} different texts")
     return series_of_texts(series.name, cells), [], []
@@ -507,18 +509,18 @@ def _grouped(cells: Sequence[str], decimal: str) -> str:
     It is the one that marks no decimals: ``1.520`` after ``980`` where decimals are commas,
     ``1,234.5`` after ``980.2`` where they are points; or ``1.000.000`` in any file.
     """
-    told = {cell for cell in cells if cell.lower() not in NO_VALUE}
-    mark, grouped = (".", BESIDE_COMMAS) if decimal == "," else (",", _BESIDE_POINTS)
-    others = [cell for cell in told if not grouped.fullmatch(cell)]
-    if 2 * len(others) < len(told) and any(mark in cell for cell in told - set(others)):
+    written = {cell for cell in cells if cell.lower() not in NO_VALUE}
+    mark, grouped = (".", GROUPED_BY_POINTS) if decimal == "," else (",", _GROUPED_BY_COMMAS)
+    others = [cell for cell in written if not grouped.fullmatch(cell)]
+    if 2 * len(others) < len(written) and any(mark in cell for cell in written - set(others)):
         plain = (cell.replace(decimal, ".") for cell in others)
         if not any(is_number(cell, ".", None) for cell in plain):
             return mark
-    twice = any(cell.count(".") > 1 for cell in told)
-    return "." if twice and all(map(_THOUSANDS.fullmatch, told)) else ""
+    twice = any(cell.count(".") > 1 for cell in written)
+    return "." if twice and all(map(_THOUSANDS.fullmatch, written)) else ""
 
 
-def _told_mark(cells: Sequence[str], mark: str) -> list[str]:
+def _mark_remark(cells: Sequence[str], mark: str) -> list[str]:
     """Remark on a mark that parts thousands, in a list; empty where none does."""
     some = [cell for cell in cells if mark and mark in cell]
     return [f"{_MARKS[mark]} part thousands, as in {cell!r}" for cell in some[:1]]
@@ -606,7 +608,7 @@ def _labelled_rows(
                 rows.append([*(times[number - 1] for _ in before if times), *[""] * len(columns)])
             filled.add(name)
             rows[-1][len(before) + place[name]] = value.replace(",", ".")
-    return rows, told_rows(strange, "lines without labels and numbers")
+    return rows, left_out_rows(strange, "lines without labels and numbers")
 
 
 def read_json(path: Path, form: TextFormat) -> Log:
