@@ -25,7 +25,7 @@ PACKAGES = {
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11163,
+    "diagnosis": 11164,
     "effects": 404,
     "experiments": 1052,
     "findings": 947,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1233,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37404
+MOST = 37405
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

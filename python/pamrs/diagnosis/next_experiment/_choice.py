@@ -389,7 +389,8 @@ def propose(
             if enough and max(o.bits for o in found) > uncertainty - 0.5 * _RESOLUTION:
                 break  # what is left costs more and cannot tell more
             one = partial(outcome, experiment, sensor)
-            compared = one() if losses is None else losses.part(f"experiment {experiment.name}", one)
+            name = f"experiment {experiment.name}"
+            compared = one() if losses is None else losses.part(name, one)
             found += [] if compared is None else [compared]
     if not found:
         raise DiagnosisError(
