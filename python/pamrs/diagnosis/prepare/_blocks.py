@@ -277,6 +277,54 @@ class _BlockMap:
         self.joint_of = {
             name: block_of(ends["joint"]) for name, ends in rig.ports("muscle").items()
         }
+        self.behind_gauges = {
+            full
+            for full in (qualified("chamber", name) for name in rig.tables("chamber"))
+            if self.pressure(full) not in self.has and self._only_lines_to_gauges(full)
+        }
+
+    def _only_lines_to_gauges(self, chamber: str) -> bool:
+        """True of a chamber that lines without segments alone join to measured pressures."""
+        paths, lines = self.around(chamber), self.rig.tables("line")
+        ends = {end for path in paths for end in path.ends} - {chamber, "ambient"}
+        return (
+            bool(ends)
+            and not any(path.command for path in paths)
+            and not any(lines[block_of(path.name)].get("segments") for path in paths)
+            and all(self.pressure(end) in self.has for end in ends)
+        )
+
+    def with_hidden(self, block: Block, *nodes: str) -> Block:
+        """A block with the chambers without a gauge among some nodes of the air and, of one of air
+        alone, next to them, which it simulates.
+        """
+        beside = () if block.mechanical else nodes
+        ends = [end for node in beside for path in self.around(node) for end in path.ends]
+        hidden = self.behind_gauges.intersection((*nodes, *ends))
+        if not hidden:
+            return block
+        inside = [
+            m for m, chamber in self.pulling.items() if qualified("chamber", chamber) in hidden
+        ]
+        moving = [] if block.mechanical else {self.joint_of[m] for m in inside}
+        names, drives = set(block.parameters), dict.fromkeys(block.drives)
+        for full in sorted(hidden):
+            names |= self.moved("chamber", block_of(full)) | self.of_paths(full)
+            names |= self.zeros(self.nodes_at(full), moving)
+            drives |= dict.fromkeys(self.neighbours(full))
+        drives |= dict.fromkeys(angle for angle in self.angles if block_of(angle) in moving)
+        return replace(
+            block,
+            drives=tuple(name for name in drives if name != block.channel),
+            parameters=frozenset(names),
+            beside=("chamber", *block.beside),
+        )
+
+    def gauges_of(self, muscles: Iterable[str]) -> tuple[str, ...]:
+        """Channels of the pressures in some muscles, but for those without a gauge behind one."""
+        chambers = dict.fromkeys(self.pulling[muscle] for muscle in muscles)
+        shown = (c for c in chambers if qualified("chamber", c) not in self.behind_gauges)
+        return tuple(dotted("muscle_pressure", chamber) for chamber in shown)
 
     def pressure(self, block: str) -> str:
         """Channel of the pressure of a supply, a chamber or a line's inlet by its full name."""
@@ -294,7 +342,11 @@ class _BlockMap:
         others = [
             end for path in self.around(block) for end in path.ends if end not in (block, "ambient")
         ]
-        known = [end for end in others if self._lacks_gauge(end, "constant", "regulator")]
+        known = [
+            end
+            for end in others
+            if end in self.behind_gauges or self._lacks_gauge(end, "constant", "regulator")
+        ]
         return tuple(dict.fromkeys(self.pressure(end) for end in others if end not in known))
 
     def _lacks_gauge(self, block: str, *kinds: str) -> bool:
@@ -462,7 +514,7 @@ class _BlockMap:
         names = self.moved("supply", name, *(behind if without_gauge else ()))
         for node in nodes:
             names |= self.of_paths(node) | self.zeros(self.nodes_at(node), ())
-        return Block(
+        block = Block(
             full,
             self.pressure(full),
             drives,
@@ -473,6 +525,7 @@ class _BlockMap:
             ("supply",) if without_gauge else (),
             tubes=self.tubes_at(full),
         )
+        return self.with_hidden(block, *nodes)
 
     def chamber(self, name: str) -> Block | Unjudged:
         """The block of one chamber; not judged where nothing feeds it although it moves a joint:
@@ -492,6 +545,9 @@ class _BlockMap:
             else "chamber"
         )
         covers = (f"regulator, {covers}" if without_gauge else covers) + _called(name)
+        if full in self.behind_gauges:
+            why = f"{self.pressure(full)} is not in every recording: simulated behind a gauge"
+            return Unjudged(full, covers, why)
         if self.angles and not self.rig.tables("valve") and not self.rig.tables("supply"):
             return Unjudged(
                 full, covers, "nothing feeds it: its pressure is what drives the muscle"
@@ -513,7 +569,7 @@ class _BlockMap:
         )
         step = _GAS_STEP if fed else _SEALED_STEP
         window = _CHAMBER_WINDOW if fed else None
-        return Block(
+        block = Block(
             full,
             self.pressure(full),
             drives,
@@ -526,6 +582,7 @@ class _BlockMap:
             self.thermometers.get(name, ""),
             warm=self.warm(name),
         )
+        return self.with_hidden(block, full)
 
     def warm(self, name: str) -> WarmGas | None:
         """A chamber's gas where it has a balance of energy and no thermometer."""
@@ -608,7 +665,7 @@ class _BlockMap:
             | self.moved("supply", *without_gauge)
             | self.zeros(self.nodes_at(full), ())
         )
-        return Block(
+        block = Block(
             full,
             self.pressure(full),
             drives,
@@ -619,20 +676,20 @@ class _BlockMap:
             ("supply",) if without_gauge else (),
             self.tubes_at(full),
         )
+        return self.with_hidden(block, full)
 
     def arm(self, joint: str) -> Block | Unjudged:
         """The block of one joint: muscles' pressures to its angle."""
-        drives = tuple(
-            dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values())
-        )
+        drives = self.gauges_of(self.pulling)
         name, covers = qualified("arm", joint), "muscle, joint and arm" + _called(joint)
         if lacking := self.lacking(name, covers, (*drives, *self.angles)):
             return lacking
         joints, links = self.rig.tables("joint"), self.rig.tables("link")
         names = self.of("arm", "") | self.of("link", *links) | self.of("muscle", *self.pulling)
         names |= self.of_motion(joints)
-        names |= self.zeros((qualified("chamber", c) for c in self.pulling.values()), joints)
-        return Block(
+        chambers = [qualified("chamber", c) for c in self.pulling.values()]
+        names |= self.zeros(chambers, joints)
+        block = Block(
             name,
             dotted("joint_angle", joint),
             drives,
@@ -641,18 +698,19 @@ class _BlockMap:
             _ARM_STEP,
             covers,
         )
+        return self.with_hidden(block, *chambers)
 
     def load(self) -> Block | Unjudged:
         """The block of a hanging load: muscles' pressures to their length."""
-        drives = tuple(
-            dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values())
-        )
+        drives = self.gauges_of(self.pulling)
         covers = "muscle and load"
         if lacking := self.lacking("load", covers, (*drives, *self.angles)):
             return lacking
         names = self.of("load", "") | self.of("muscle", *self.pulling)
-        names |= self.zeros((qualified("chamber", c) for c in self.pulling.values()), ())
-        return Block("load", "length", drives, _ARM_WINDOW, frozenset(names), _ARM_STEP, covers)
+        chambers = [qualified("chamber", c) for c in self.pulling.values()]
+        names |= self.zeros(chambers, ())
+        given = ("load", "length", drives, _ARM_WINDOW, frozenset(names), _ARM_STEP, covers)
+        return self.with_hidden(Block(*given), *chambers)
 
     def pull(self, joint: str) -> Block | None:
         """The block of what the muscles put on a joint or a load, where that is measured: their
@@ -660,14 +718,15 @@ class _BlockMap:
         """
         loaded, channel = bool(self.rig.model["load"]), pulls_of(self.rig)[joint]
         pulling = [m for m in self.pulling if loaded or self.joint_of[m] == joint]
-        drives = tuple(dict.fromkeys(dotted("muscle_pressure", self.pulling[m]) for m in pulling))
+        drives = self.gauges_of(pulling)
         moving = ("length",) if loaded else (dotted("joint_angle", joint),)
         if not pulling or not {channel, *drives, *self.angles} <= self.has:
             return None
         names = self.of("muscle", *pulling) | (set() if loaded else self.of_motion([joint]))
-        names |= self.zeros([qualified("chamber", self.pulling[m]) for m in pulling], [joint])
+        chambers = [qualified("chamber", self.pulling[m]) for m in pulling]
+        names |= self.zeros(chambers, [joint])
         names |= {"sensors.force_gain"} if loaded else set()
-        return Block(
+        block = Block(
             "force" if loaded else qualified("torque", joint),
             channel,
             (*drives, *moving),
@@ -676,6 +735,7 @@ class _BlockMap:
             _ARM_STEP,
             "muscle" + _called(joint),
         )
+        return self.with_hidden(block, *chambers)
 
 
 def _called(name: str) -> str:

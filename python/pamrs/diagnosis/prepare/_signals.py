@@ -580,6 +580,7 @@ def unusable(recording: Recording, rig: Rig, core: _core.Rig, settings: Diagnosi
         need.
     """
     wanted = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
+    wanted += [name for name in core.channels if channel_of(name) == "line_pressure"]
     if not set(wanted) & set(recording.channels):
         return (
             f"it has no channel {' or '.join(wanted)}, without which no block can be cut out; it "
