@@ -25,7 +25,7 @@ PACKAGES = {
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11164,
+    "diagnosis": 11154,
     "effects": 404,
     "experiments": 1052,
     "findings": 947,
@@ -35,13 +35,13 @@ PACKAGES = {
     "report": 2070,
     "rig": 2227,
     "rigs": 141,
-    "simulation": 1090,
+    "simulation": 1095,
     "studio": 663,
     "sweeps": 812,
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27742,
+    "tests": 27828,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1233,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37405
+MOST = 37400
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

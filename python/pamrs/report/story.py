@@ -59,9 +59,14 @@ def title(diagnosis: Findings) -> str:
     together = _together(parts, doubt=bool(diagnosis.answer.missed))
     if together and len(together.split()) <= LONGEST:
         return together
-    others = _listed([_place(part) for part in parts[1:]], 2, "and")
-    acts = "in" if all(part.sure for part in parts[1:]) else "may act in"
-    end = f"; something else {acts} the {others}" if others else ""
+    # a value may be wrong in several groups
+    other = [
+        part
+        for part in parts[1:]
+        if not (part.sure and part.group.wrong_parameters and part.names == parts[0].names)
+    ]
+    acts = "in" if all(part.sure for part in other) else "may act in"
+    end = f"; something else {acts} the {_listed([*map(_place, other)], 2, 'and')}" * bool(other)
     end += "".join(f", with {law.name} = {law.other}" for law in diagnosis.laws[:1])
     every = (_phrase(diagnosis, parts[0], most) + end for most in (3, 2, 1))
     short = (sentence for sentence in every if len(sentence.split()) <= LONGEST)
@@ -83,11 +88,9 @@ def headline(diagnosis: Findings) -> str:
         return ". ".join([*first, "; ".join(reading.text for reading in diagnosis.misread)])
     parts, missed = diagnosis.answer.parts, words.missed_sentence(diagnosis)
     parts = [part for part in parts if not missed or words.searched(part)]
-    phrases = [
-        _phrase(diagnosis, part, MOST_RIVALS) + _missing_input(diagnosis, part) for part in parts
-    ]
+    each = (_phrase(diagnosis, p, MOST_RIVALS) + _missing_input(diagnosis, p) for p in parts)
     together = _together(parts, doubt=bool(missed))
-    phrases = [together] if together else phrases
+    phrases = [together] if together else list(dict.fromkeys(each))
     still = [missed] * bool(missed)
     sentences = [*phrases, *still] if diagnosis.answer.named else [*still, *phrases]
     sentences = sentences or [title(diagnosis)]

@@ -10,6 +10,7 @@ import numpy as np
 from pamrs._arrays import Array
 from pamrs.channels import channel_of, dotted, recorded_as
 from pamrs.errors import RecordingError
+from pamrs.rig.schema import qualified
 from pamrs.simulation._driving import has_frame, sensor_zero, supplies_of
 from pamrs.simulation._simulation import Simulation, simulate
 
@@ -43,7 +44,8 @@ def replay(
     Commands of valves and regulators come from the recording, the length of a load frame, the
     pressures of supplies of kind ``measured`` and those of chambers that nothing feeds as well
     (``muscle_pressure``, or where that was not measured ``pressure_command``); what a recording
-    leaves unusable holds its last usable value.
+    leaves unusable holds its last usable value. A chamber without ``muscle_pressure`` that lines
+    alone join to a gauge begins at its pressure.
     Parameters that had another value in the recording have it.
 
     Parameters
@@ -86,20 +88,32 @@ def replay(
                 full = dotted(channel, name)
                 first = float(recording.channels[full][recording.mask[full]][0])
                 initial[full] = first - sensor_zero(rig, *_STATES[channel], name)
-    for name, kelvin in (temperatures or {}).items():
-        initial[dotted("temperature", name)] = kelvin
+    _begin_behind_gauges(rig, initial)
+    initial |= {dotted("temperature", n): kelvin for n, kelvin in (temperatures or {}).items()}
     if not drive:
         drive["duration"] = float(recording.time[-1])
-    step = recording.sample_time
-    return simulate(rig, sample_time=step, initial=initial, record=record, **drive)
+    drive |= {"initial": initial, "record": record}
+    return simulate(rig, sample_time=recording.sample_time, **drive)
+
+
+def _begin_behind_gauges(rig: Rig, initial: dict[str, float]) -> None:
+    """Let chambers without a pressure that lines alone feed begin at that of a gauge, at rest."""
+    gauges = {
+        qualified(block, name): dotted(channel, name)
+        for channel, (block, _) in _STATES.items()
+        for name in rig.tables(block)
+    }
+    valved = {end for ends in rig.ports("valve").values() for end in ends.values()}
+    lines = [(e["from"] or qualified("line", n), e["to"]) for n, e in rig.ports("line").items()]
+    for own, other in (*lines, *((end, beginning) for beginning, end in lines)):
+        if channel_of(own) == "chamber" and own not in valved and gauges.get(other) in initial:
+            initial.setdefault(gauges[own], initial[gauges[other]])
 
 
 def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
     """The keywords of :func:`pamrs.simulate` that a recording gives."""
-    drive: dict[str, Any] = {}
     valves = {name: _held(recording, dotted("valve_command", name)) for name in rig.tables("valve")}
-    if valves:
-        drive["valve_command"] = valves
+    drive: dict[str, Any] = {"valve_command": valves} if valves else {}
     commands = {
         name: _held(recording, dotted("supply_command", name))
         for name in supplies_of(rig, "regulator")
@@ -114,8 +128,7 @@ def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
             - sensor_zero(rig, *_STATES["supply_pressure"], name)
             for name in sources
         }
-    frame = has_frame(rig)
-    if frame:
+    if has_frame(rig):
         drive["length"] = _held(recording, "length")
     # Where muscles pull and nothing feeds them, their measured pressure is what moves them.
     if rig.tables("muscle") and not (valves or rig.tables("supply")):
@@ -170,8 +183,11 @@ def differences(result: Simulation, recording: Recording) -> dict[str, float]:
     """
     drive = _drive(result.rig, recording)
     skipped = {"time", "valve_command", "supply_command", *drive} - {*_PRESCRIBED}
-    for signal, channel in _PRESCRIBED.items():
-        skipped |= {dotted(channel, name) for name in drive.get(signal, ())}
+    skipped |= {
+        dotted(channel, name)
+        for signal, channel in _PRESCRIBED.items()
+        for name in drive.get(signal, ())
+    }
     found = {}
     for name in result:
         other = recorded_as(name)

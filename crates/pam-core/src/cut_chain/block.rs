@@ -78,11 +78,13 @@ impl Block {
     /// # Errors
     /// [`Error::Parameter`] for an arm whose links are not possible.
     pub fn longest_step(self, rig: &Rig, measured: &Measured<'_>) -> Result<f64> {
-        if self.mechanical() {
-            return Ok(rig.body_step());
+        let body = if self.mechanical() { rig.body_step() } else { f64::INFINITY };
+        if self.mechanical() && behind_gauges(rig, measured).next().is_none() {
+            return Ok(body);
         }
         let simulated = self.simulated(rig, measured);
-        rig.air_step(|node| node.place(rig.layout()).is_some_and(|place| simulated.moves(place)))
+        let moves = |node: Node| node.place(rig.layout()).is_some_and(|p| simulated.moves(p));
+        Ok(rig.air_step(moves)?.min(body))
     }
 
     /// Where an input that nobody measured enters; None where it would only add to what is read.
@@ -166,18 +168,26 @@ impl Block {
             Self::Pull(_) => {
                 let groups = 0..rig.wiring.groups.len();
                 places.extend(groups.flat_map(|k| effect_states(rig, Place::Group(k))));
-                return Simulated::only(rig, &places).pulling();
             }
+        }
+        for (gas, _) in behind_gauges(rig, measured) {
+            places.extend([layout.pressure(gas), layout.mass(gas)]);
+            places.extend(effect_states(rig, Place::Gas(gas)));
         }
         for supply in unread(rig, self, measured) {
             places.push(layout.supply(supply));
             places.extend(effect_states(rig, Place::Supply(supply)));
         }
-        if !matches!(self, Self::Arm(_)) {
-            places.extend(hidden(layout, measured));
+        if !self.mechanical() {
+            places.extend(inlets(layout, measured));
             places.extend(layout.flow(0)..layout.angle(0));
         }
-        Simulated::only(rig, &places)
+        let simulated = Simulated::only(rig, &places);
+        if matches!(self, Self::Pull(_)) {
+            simulated.pulling()
+        } else {
+            simulated
+        }
     }
 }
 
@@ -194,9 +204,35 @@ fn own_states(layout: &Layout, acting: &Acting) -> Range<usize> {
 }
 
 /// Pressures inside lines that were not measured.
-pub(super) fn hidden(layout: &Layout, measured: &Measured<'_>) -> Vec<usize> {
+fn inlets(layout: &Layout, measured: &Measured<'_>) -> Vec<usize> {
     let inlets = (layout.chambers..layout.gases).map(|k| layout.pressure(k));
     inlets.filter(|place| measured.signal(*place).is_none()).collect()
+}
+
+/// Chambers that nobody measured behind gauges: lines without segments alone join them, to what was
+/// measured or to the ambient. Each with the place of a pressure there.
+pub(super) fn behind_gauges<'a>(
+    rig: &'a Rig,
+    measured: &'a Measured<'_>,
+) -> impl Iterator<Item = (usize, usize)> + 'a {
+    let (layout, wiring) = (rig.layout(), &rig.wiring);
+    (0..layout.chambers).filter_map(move |gas| {
+        let own = Node::Gas(gas);
+        let valved = wiring.valves.iter().any(|v| v.to == gas || v.from == own);
+        if valved || measured.signal(layout.pressure(gas)).is_some() {
+            return None;
+        }
+        let mut gauge = None;
+        for line in wiring.lines.iter().filter(|line| line.from == own || line.to == own) {
+            let other = if line.from == own { line.to } else { line.from };
+            match other.place(layout) {
+                _ if line.segments > 0 => return None,
+                Some(place) if measured.signal(place).is_none() => return None,
+                place => gauge = gauge.or(place),
+            }
+        }
+        gauge.map(|place| (gas, place))
+    })
 }
 
 /// Regulators next to a chamber, or behind a supply, whose outlet nobody measured: their command
@@ -263,7 +299,8 @@ pub(super) fn check(
             "the block load cannot be predicted: a frame holds the length".into(),
         ));
     }
-    let mut hidden = hidden(rig.layout(), measured);
+    let mut hidden = inlets(rig.layout(), measured);
+    hidden.extend(behind_gauges(rig, measured).map(|(gas, _)| rig.layout().pressure(gas)));
     hidden.extend(unread(rig, block, measured).into_iter().map(|k| rig.layout().supply(k)));
     for place in neighbours(rig, block) {
         if measured.signal(place).is_none() && !hidden.contains(&place) {

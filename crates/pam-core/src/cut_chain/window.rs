@@ -1,7 +1,7 @@
 //! The windows of a prediction: each starts from the measurement, and measured neighbours drive the
 //! block through it.
 
-use super::block::{fed_by, unread, Block};
+use super::block::{behind_gauges, fed_by, unread, Block};
 use super::boundary::{driven, rest_length, taps, zero, Driven};
 use super::clock::Clocks;
 use super::measured::Measured;
@@ -296,6 +296,9 @@ impl<'a, S: Number> Cut<'a, S> {
             if let (None, Some(end)) = (self.measured.signal(place), end.place(layout)) {
                 state[place] = state[end];
             }
+        }
+        for (gas, gauge) in behind_gauges(rig, self.measured) {
+            state[layout.pressure(gas)] = state[gauge];
         }
         // at rest what nobody measures of a regulator's outlet is what it feeds
         if let Some(output) = self.block.output(layout) {

@@ -173,7 +173,7 @@ class _Beginnings:
         """Samples up to the last one that shows how what nobody measured in a block began."""
         return max(
             self._last_sample(block, self._change_by_outlets(block))
-            if _regulator_commands(block) and block.simulated
+            if "supply" in block.simulated
             else 0,
             self._last_sample(block, self._change_by_tubes(block)) if block.tubes else 0,
         )
@@ -288,7 +288,7 @@ def _regulator_commands(block: Block) -> list[str]:
 def _unmeasured(block: Block) -> str:
     """Words on what nobody measured in a block, and on what would measure it."""
     reasons = []
-    if _regulator_commands(block) and block.simulated:
+    if "supply" in block.simulated:
         gauges = [dotted("supply_pressure", block_of(name)) for name in _regulator_commands(block)]
         reasons.append(
             "they show where the regulator began, and nobody measured that (a gauge for "

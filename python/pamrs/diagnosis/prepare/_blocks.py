@@ -277,6 +277,64 @@ class _BlockMap:
         self.joint_of = {
             name: block_of(ends["joint"]) for name, ends in rig.ports("muscle").items()
         }
+        self.behind_gauges = [
+            full
+            for full in (qualified("chamber", name) for name in rig.tables("chamber"))
+            if self.pressure(full) not in self.has and self._only_lines_to_gauges(full)
+        ]
+
+    def _only_lines_to_gauges(self, chamber: str) -> bool:
+        """True of a chamber that lines without segments alone join to measured pressures."""
+        ends = self.ends(chamber)
+        return (
+            bool(ends)
+            and not self.commands(chamber)
+            and not self.tubes_at(chamber)
+            and all(self.pressure(end) in self.has for end in ends)
+        )
+
+    def judged(self, block: Block, *nodes: str) -> Block | Unjudged:
+        """A block with what drives some nodes of its air and what they depend on, and with the
+        regulators and chambers without a gauge next to them, which it simulates too; not judged
+        where a channel is missing. Of the chambers of muscles only those without a gauge count.
+        """
+        nodes = tuple(n for n in nodes if not block.mechanical or n in self.behind_gauges)
+        ends = [end for node in nodes for end in (node, *self.ends(node))]
+        hidden = [chamber for chamber in self.behind_gauges if chamber in ends]
+        air = dict.fromkeys((*nodes, *hidden))
+        regulators = dict.fromkeys(one for node in air for one in self.without_gauge(node))
+        joints = [
+            self.joint_of[muscle]
+            for muscle, name in self.pulling.items()
+            if block.kind != "arm" and qualified("chamber", name) in (block.name, *hidden)
+        ]
+        needed = (
+            *block.drives,
+            *(channel for node in air for channel in self.neighbours(node)),
+            *(command for node in air for command in self.commands(node)),
+            *(dotted("supply_command", one) for one in regulators),
+            *(channel for one in regulators for channel in self.in_front(one)),
+            *(angle for angle in self.angles if block_of(angle) in joints),
+        )
+        simulated = (block.channel, *(self.pressure(chamber) for chamber in hidden))
+        drives = tuple(name for name in dict.fromkeys(needed) if name not in simulated)
+        missing = [n for n in (block.channel, *drives, *self.angles) if n not in self.has]
+        if missing:
+            return Unjudged(block.name, block.covers, _not_recorded(missing))
+        names = (
+            block.parameters
+            | self.moved("supply", *regulators)
+            | self.moved("chamber", *map(block_of, hidden))
+        )
+        for node in air:
+            names |= self.of_paths(node) | self.zeros(self.nodes_at(node), joints)
+        return replace(
+            block,
+            drives=drives,
+            parameters=frozenset(names),
+            covers=block.covers + (", with line and chamber" if hidden else ""),
+            simulated=(*(["chamber"] if hidden else []), *(["supply"] if regulators else [])),
+        )
 
     def pressure(self, block: str) -> str:
         """Channel of the pressure of a supply, a chamber or a line's inlet by its full name."""
@@ -287,15 +345,20 @@ class _BlockMap:
         """The flow paths that begin or end at a supply, a chamber or a line's inlet."""
         return [path for path in self.paths if block in path.ends]
 
+    def ends(self, block: str) -> list[str]:
+        """Full names of what the flow paths at a block lead to, but for the ambient."""
+        ends = dict.fromkeys(end for path in self.around(block) for end in path.ends)
+        return [end for end in ends if end not in (block, "ambient")]
+
     def neighbours(self, block: str) -> tuple[str, ...]:
         """Channels of the pressures next to a block; that of a constant supply is known without
-        measuring it.
+        measuring it, those of regulators and chambers without a gauge are simulated.
         """
-        others = [
-            end for path in self.around(block) for end in path.ends if end not in (block, "ambient")
-        ]
-        known = [end for end in others if self._lacks_gauge(end, "constant", "regulator")]
-        return tuple(dict.fromkeys(self.pressure(end) for end in others if end not in known))
+        return tuple(
+            self.pressure(end)
+            for end in self.ends(block)
+            if end not in self.behind_gauges and not self._lacks_gauge(end, "constant", "regulator")
+        )
 
     def _lacks_gauge(self, block: str, *kinds: str) -> bool:
         """True where a block is a supply of one of these kinds whose pressure nobody measured."""
@@ -307,11 +370,14 @@ class _BlockMap:
         )
 
     def without_gauge(self, block: str) -> list[str]:
-        """Names of the regulators next to a chamber whose outlet nobody measured: their command
-        says what it is.
+        """Names of the regulators at a block whose outlet nobody measured, itself or next to it:
+        their command says what it is.
         """
-        ends = dict.fromkeys(end for path in self.around(block) for end in path.ends)
-        return [block_of(end) for end in ends if self._lacks_gauge(end, "regulator")]
+        return [
+            block_of(end)
+            for end in (block, *self.ends(block))
+            if self._lacks_gauge(end, "regulator")
+        ]
 
     def behind(self, supply: str) -> list[str]:
         """Names of the regulators whose inlet a supply is: what they let through is drawn from
@@ -377,12 +443,8 @@ class _BlockMap:
 
     def of_paths(self, block: str) -> set[str]:
         """Parameters of the valves and lines at a block."""
-        names: set[str] = set()
-        for path in self.around(block):
-            for full in (path.name, *path.between):
-                kind, _, name = full.partition(".")
-                names |= self.moved(kind, name)
-        return names
+        full = [name for path in self.around(block) for name in (path.name, *path.between)]
+        return {one for name in full for one in self.moved(channel_of(name), block_of(name))}
 
     def tubes_at(self, block: str) -> tuple[Tube, ...]:
         """The tubes of segments among the flow paths at a block."""
@@ -406,7 +468,7 @@ class _BlockMap:
         """Chambers, supplies and inlets of lines at which a block is cut, by their full names:
         itself, where its flow paths lead, and what feeds a regulator that it simulates.
         """
-        ends = {block, *(end for path in self.around(block) for end in path.ends)} - {"ambient"}
+        ends = {block, *self.ends(block)}
         simulated = [e for e in ends if e == block or self._lacks_gauge(e, "regulator")]
         supplies = self.rig.ports("supply")
         inlets = [
@@ -416,31 +478,19 @@ class _BlockMap:
         ]
         return ends | {inlet for inlet in inlets if inlet}
 
-    def lacking(self, name: str, covers: str, needed: Iterable[str]) -> Unjudged | None:
-        """Entry of a block that is not judged for want of channels; None where all are there."""
-        missing = [channel for channel in needed if channel not in self.has]
-        return Unjudged(name, covers, _not_recorded(missing)) if missing else None
-
     def supply(self, name: str) -> Block | Unjudged | None:
         """The block of one supply; none where its pressure is what the rig file says, what was
         recorded whatever gives it, or simulated with what it feeds.
         """
         full, table = qualified("supply", name), self.rig.tables("supply")[name]
         behind = self.behind(full)
-        without_gauge = [
-            one for one in behind if self._lacks_gauge(qualified("supply", one), "regulator")
-        ]
         itself = [name] if table["kind"] == "regulator" else []
         nodes = (full, *(qualified("supply", one) for one in behind))
-        read = [self.pressure(node) for node in nodes[1:]]
         drives = (
-            *(channel for node in nodes for channel in self.neighbours(node)),
-            *(channel for channel in read if channel in self.has),
+            *(self.pressure(node) for node in nodes[1:] if self.pressure(node) in self.has),
             *(channel for one in itself for channel in self.in_front(one)),
-            *(command for node in nodes for command in self.commands(node)),
-            *(dotted("supply_command", one) for one in (*itself, *without_gauge)),
+            *(dotted("supply_command", one) for one in itself),
         )
-        drives = tuple(dict.fromkeys(drives))
         covers = "regulator" if table["kind"] == "regulator" else "supply"
         covers += (
             " and regulator"
@@ -457,35 +507,27 @@ class _BlockMap:
             # noise of two gauges at a line goes both ways, and is drawn one way
             why = "a regulator that it feeds has a line behind it, and no valve"
             return Unjudged(full, covers, why)
-        if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
-            return lacking
-        names = self.moved("supply", name, *(behind if without_gauge else ()))
-        for node in nodes:
-            names |= self.of_paths(node) | self.zeros(self.nodes_at(node), ())
-        return Block(
+        block = Block(
             full,
             self.pressure(full),
             drives,
             _SUPPLY_WINDOW,
-            frozenset(names),
+            frozenset(self.moved("supply", name)),
             _GAS_STEP,
             covers,
-            ("supply",) if without_gauge else (),
             tubes=self.tubes_at(full),
         )
+        return self.judged(block, *nodes)
 
-    def chamber(self, name: str) -> Block | Unjudged:
-        """The block of one chamber; not judged where nothing feeds it although it moves a joint:
-        its pressure is then what is given.
+    def chamber(self, name: str) -> Block | Unjudged | None:
+        """The block of one chamber; none where it is simulated from a gauge on, not judged where
+        nothing feeds it although it moves a joint: its pressure is then what is given.
         """
         full = qualified("chamber", name)
+        if full in self.behind_gauges:
+            return None
         without_gauge = self.without_gauge(full)
         fed = bool(self.neighbours(full) or self.commands(full) or without_gauge)
-        joints = tuple(
-            dict.fromkeys(
-                self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name
-            )
-        )
         covers = (
             ("valve, line and chamber" if self.commands(full) else "line and chamber")
             if fed
@@ -496,36 +538,19 @@ class _BlockMap:
             return Unjudged(
                 full, covers, "nothing feeds it: its pressure is what drives the muscle"
             )
-        drives = (
-            *self.neighbours(full),
-            *self.commands(full),
-            *(dotted("supply_command", supply) for supply in without_gauge),
-            *(channel for supply in without_gauge for channel in self.in_front(supply)),
-            *(a for a in self.angles if block_of(a) in joints),
-        )
-        if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
-            return lacking
-        names = (
-            self.of_paths(full)
-            | self.moved("chamber", name)
-            | self.moved("supply", *without_gauge)
-            | self.zeros(self.nodes_at(full), joints or [""])
-        )
-        step = _GAS_STEP if fed else _SEALED_STEP
-        window = _CHAMBER_WINDOW if fed else None
-        return Block(
+        block = Block(
             full,
             self.pressure(full),
-            drives,
-            window,
-            frozenset(names),
-            step,
+            (),
+            _CHAMBER_WINDOW if fed else None,
+            frozenset(self.moved("chamber", name)),
+            _GAS_STEP if fed else _SEALED_STEP,
             covers,
-            ("supply",) if without_gauge else (),
-            self.tubes_at(full),
-            self.thermometers.get(name, ""),
+            tubes=self.tubes_at(full),
+            thermometer=self.thermometers.get(name, ""),
             warm=self.warm(name),
         )
+        return self.judged(block, full)
 
     def warm(self, name: str) -> WarmGas | None:
         """A chamber's gas where it has a balance of energy and no thermometer."""
@@ -540,12 +565,12 @@ class _BlockMap:
             float(self.rig.limits.get("max_pressure", 0.0)),
         )
 
-    def temperature(self, chamber: Block | Unjudged) -> Block | None:
+    def temperature(self, chamber: Block | Unjudged | None) -> Block | None:
         """The block of a gas whose temperature is measured: that of its pressure, read off by the
         thermometer. The pressure is taken anew as often as its own windows begin, so that it does
         not drift; the temperature goes on.
         """
-        if isinstance(chamber, Unjudged) or not chamber.thermometer:
+        if not isinstance(chamber, Block) or not chamber.thermometer:
             return None
         name = block_of(chamber.name)
         return replace(
@@ -559,123 +584,98 @@ class _BlockMap:
             anchor=chamber.window,
         )
 
-    def flow(self, name: str) -> Block | None:
+    def flow(self, name: str) -> Block | Unjudged | None:
         """The block of what flows into a chamber, where that is measured: the pressures around it
         and the commands to a flow.
         """
-        full, channel = qualified("chamber", name), flows_of(self.rig)[name]
-        without_gauge = self.without_gauge(full)
-        drives = (
-            self.pressure(full),
-            *self.neighbours(full),
-            *self.commands(full),
-            *(dotted("supply_command", supply) for supply in without_gauge),
-            *(gauge for supply in without_gauge for gauge in self.in_front(supply)),
-        )
-        if not {channel, *drives, *self.angles} <= self.has or self.tubes_at(full):
+        full = qualified("chamber", name)
+        if self.pressure(full) not in self.has or self.tubes_at(full):
             return None
-        names = self.of_paths(full) | self.moved("supply", *without_gauge)
-        return Block(
+        block = Block(
             dotted("flow", name),
-            channel,
-            drives,
+            flows_of(self.rig)[name],
+            (self.pressure(full),),
             None,  # nothing is integrated that could drift
-            frozenset(names | self.zeros(self.nodes_at(full), ())),
+            frozenset(),
             _GAS_STEP,
             ("valve" if self.commands(full) else "line") + _called(name),
-            ("supply",) if without_gauge else (),
         )
+        return self.judged(block, full)
 
     def inlet(self, name: str) -> Block | Unjudged | None:
         """The block of a valve alone: what it feeds into a line at whose inlet there is a gauge."""
         full = qualified("line", name)
         if self.pressure(full) not in self.has or not self.commands(full):
             return None
-        without_gauge = self.without_gauge(full)
-        drives = (
-            *self.neighbours(full),
-            *self.commands(full),
-            *(dotted("supply_command", supply) for supply in without_gauge),
-            *(channel for supply in without_gauge for channel in self.in_front(supply)),
-        )
-        covers = ("regulator and valve" if without_gauge else "valve and line inlet") + _called(
-            name
-        )
-        if lacking := self.lacking(full, covers, (*drives, *self.angles)):
-            return lacking
-        names = (
-            self.of_paths(full)
-            | self.moved("supply", *without_gauge)
-            | self.zeros(self.nodes_at(full), ())
-        )
-        return Block(
+        feeding = "regulator and valve" if self.without_gauge(full) else "valve and line inlet"
+        block = Block(
             full,
             self.pressure(full),
-            drives,
+            (),
             _CHAMBER_WINDOW,
-            frozenset(names),
+            frozenset(),
             _GAS_STEP,
-            covers,
-            ("supply",) if without_gauge else (),
-            self.tubes_at(full),
+            feeding + _called(name),
+            tubes=self.tubes_at(full),
         )
+        return self.judged(block, full)
 
     def arm(self, joint: str) -> Block | Unjudged:
         """The block of one joint: muscles' pressures to its angle."""
-        drives = tuple(
-            dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values())
-        )
-        name, covers = qualified("arm", joint), "muscle, joint and arm" + _called(joint)
-        if lacking := self.lacking(name, covers, (*drives, *self.angles)):
-            return lacking
         joints, links = self.rig.tables("joint"), self.rig.tables("link")
         names = self.of("arm", "") | self.of("link", *links) | self.of("muscle", *self.pulling)
-        names |= self.of_motion(joints)
-        names |= self.zeros((qualified("chamber", c) for c in self.pulling.values()), joints)
-        return Block(
-            name,
+        chambers = self.chambers_of(self.pulling)
+        block = Block(
+            qualified("arm", joint),
             dotted("joint_angle", joint),
-            drives,
+            tuple(map(self.pressure, chambers)),
             _ARM_WINDOW,
-            frozenset(names),
+            frozenset(names | self.of_motion(joints) | self.zeros(chambers, joints)),
             _ARM_STEP,
-            covers,
+            "muscle, joint and arm" + _called(joint),
         )
+        return self.judged(block, *chambers)
 
     def load(self) -> Block | Unjudged:
         """The block of a hanging load: muscles' pressures to their length."""
-        drives = tuple(
-            dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values())
+        chambers = self.chambers_of(self.pulling)
+        block = Block(
+            "load",
+            "length",
+            tuple(map(self.pressure, chambers)),
+            _ARM_WINDOW,
+            frozenset(
+                self.of("load", "") | self.of("muscle", *self.pulling) | self.zeros(chambers, ())
+            ),
+            _ARM_STEP,
+            "muscle and load",
         )
-        covers = "muscle and load"
-        if lacking := self.lacking("load", covers, (*drives, *self.angles)):
-            return lacking
-        names = self.of("load", "") | self.of("muscle", *self.pulling)
-        names |= self.zeros((qualified("chamber", c) for c in self.pulling.values()), ())
-        return Block("load", "length", drives, _ARM_WINDOW, frozenset(names), _ARM_STEP, covers)
+        return self.judged(block, *chambers)
 
-    def pull(self, joint: str) -> Block | None:
+    def pull(self, joint: str) -> Block | Unjudged | None:
         """The block of what the muscles put on a joint or a load, where that is measured: their
         pressures and the motion to a torque or a force.
         """
-        loaded, channel = bool(self.rig.model["load"]), pulls_of(self.rig)[joint]
+        loaded = bool(self.rig.model["load"])
         pulling = [m for m in self.pulling if loaded or self.joint_of[m] == joint]
-        drives = tuple(dict.fromkeys(dotted("muscle_pressure", self.pulling[m]) for m in pulling))
-        moving = ("length",) if loaded else (dotted("joint_angle", joint),)
-        if not pulling or not {channel, *drives, *self.angles} <= self.has:
+        if not pulling:
             return None
-        names = self.of("muscle", *pulling) | (set() if loaded else self.of_motion([joint]))
-        names |= self.zeros([qualified("chamber", self.pulling[m]) for m in pulling], [joint])
-        names |= {"sensors.force_gain"} if loaded else set()
-        return Block(
+        names = {"sensors.force_gain"} if loaded else self.of_motion([joint])
+        chambers = self.chambers_of(pulling)
+        block = Block(
             "force" if loaded else qualified("torque", joint),
-            channel,
-            (*drives, *moving),
+            pulls_of(self.rig)[joint],
+            (*map(self.pressure, chambers), "length" if loaded else dotted("joint_angle", joint)),
             None,  # nothing is integrated that could drift
-            frozenset(names),
+            frozenset(names | self.of("muscle", *pulling) | self.zeros(chambers, [joint])),
             _ARM_STEP,
             "muscle" + _called(joint),
         )
+        return self.judged(block, *chambers)
+
+    def chambers_of(self, muscles: Iterable[str]) -> list[str]:
+        """Full names of the chambers of some muscles."""
+        return [qualified("chamber", self.pulling[muscle]) for muscle in muscles]
 
 
 def _called(name: str) -> str:
@@ -720,21 +720,19 @@ def _all_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block | Unjudged]:
     # what a small flow adds up to is seen from the valve on: two gauges at a tube hardly tell it
     closed = tuple(name for name in channels if channel_of(name) != "line_pressure")
     whole = _BlockMap(rig, closed)
-
-    def chamber(name: str) -> Block | Unjudged:
-        block = whole.chamber(name)
-        return block if isinstance(block, Block) else have.chamber(name)
-
-    chambers = [chamber(name) for name in rig.tables("chamber")]
+    chambers = [
+        block if isinstance(block := whole.chamber(name), Block) else have.chamber(name)
+        for name in rig.tables("chamber")
+    ]
     blocks = [
         *(have.supply(name) for name in rig.tables("supply")),
         *(have.inlet(name) for name in rig.tables("line")),
         *chambers,
         *(have.temperature(block) for block in chambers),
-        *(have.flow(name) for name in flows_of(rig)),
+        *(b for b in map(have.flow, flows_of(rig)) if isinstance(b, Block)),
         *((have.arm(name) for name in rig.tables("joint")) if rig.tables("arm") else ()),
         *([have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else ()),
-        *(have.pull(name) for name in pulls_of(rig)),
+        *(b for b in map(have.pull, pulls_of(rig)) if isinstance(b, Block)),
     ]
     return [block for block in blocks if block is not None]
 

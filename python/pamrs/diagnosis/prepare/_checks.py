@@ -174,6 +174,17 @@ def _held(case: Case, _: DiagnosisSettings) -> Found:
     return Found(_notes_on_held(case.rig), replace(case, rig=without_passing(case.rig)))
 
 
+def _closed(recording: Recording, rig: Rig) -> str:
+    """Reason why no block can be cut out of a recording by itself; empty where one may be."""
+    wanted = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
+    return (
+        ""
+        if {*wanted} & {*recording.channels} or available_blocks(rig, tuple(recording.channels))
+        else f"it has no channel {' or '.join(wanted)}, without which no block can be cut out; it "
+        f"has: {', '.join(recording.channels)}"
+    )
+
+
 def _open(case: Case, _: DiagnosisSettings) -> Found:
     """Evidence of channels that surround no block."""
     text = (
@@ -352,7 +363,7 @@ CHECKS: Final = (
         "channels that the blocks need",
         "Is the recording long enough, and is enough of each channel usable?",
         Action.LEAVE_OUT,
-        _each(lambda r, rig, limits: [unusable(r, rig, core_rig(rig), limits)]),
+        _each(lambda r, rig, limits: [_closed(r, rig) or unusable(r, rig, core_rig(rig), limits)]),
     ),
     Check(
         "blocks",

@@ -496,7 +496,8 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
     Raises
     ------
     DiagnosisError
-        If the recording is too short, or lacks a channel that the rig's blocks need.
+        If the recording is too short, or lacks a command or usable samples that the rig's blocks
+        need.
     """
     core = core_rig(rig)
     if why := unusable(recording, rig, core, settings):
@@ -567,15 +568,9 @@ def unusable(recording: Recording, rig: Rig, core: _core.Rig, settings: Diagnosi
     Returns
     -------
     str
-        That it is too short, or lacks a channel or usable samples of one that the rig's blocks
-        need.
+        That it is too short, or lacks a command or usable samples of a channel that the rig's
+        blocks need.
     """
-    wanted = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
-    if not set(wanted) & set(recording.channels):
-        return (
-            f"it has no channel {' or '.join(wanted)}, without which no block can be cut out; it "
-            f"has: {', '.join(recording.channels)}"
-        )
     length = max(_RECORDING_LEAST_SAMPLES, filter_length(recording.sample_time, settings))
     if len(recording) < length:
         return f"it has {len(recording)} samples; at least {length} are needed for a diagnosis"

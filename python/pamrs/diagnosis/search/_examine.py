@@ -364,7 +364,7 @@ def _add_form(group: BlockGroup, refit: Refit, say: Say, tell: Say) -> BlockGrou
     """Add a form of what is missing to a group, where no name is likely and a form carries over."""
     attempts, start = refit.attempts, refit.start
     # what is missing in a chamber is missing in the temperature of its gas too
-    suspects = [b for b in attempts.suspects if "chamber" not in b.simulated] or attempts.suspects
+    suspects = [b for b in attempts.suspects if b.kind != "temperature"] or attempts.suspects
     if group.probabilities[UNLISTED] < _FROM_PROBABILITY or len({b.kind for b in suspects}) < len(
         suspects
     ):
