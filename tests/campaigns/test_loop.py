@@ -282,6 +282,23 @@ def test_no_proposed_command_leaves_the_limits(rig, pool, diagnosed, tmp_path):
     assert sent.max() <= 6.0
 
 
+def test_a_run_that_went_too_high_is_no_leave_for_the_next_one(rig, pool, diagnosed, tmp_path):
+    names = ("step_and_shut", "fast_triangle")
+    diagnosed.answers += [Found(rig, ask=asks(rig, pool, name)) for name in names]
+    area = float(rig.parameter("valve.discharge_area_max").value)
+    plant = SimulatedBench(rig.with_parameters({"valve.discharge_area_max": 2.0 * area}))
+    before = log(rig, tmp_path, pool, parts=8)
+    found = campaign(plant, rig, before, out=tmp_path, bench=FAST, budget=Budget(60, 2, 5000))
+    first, second = found.steps
+    known = before[0].channels["muscle_pressure"].max()
+    table = np.loadtxt(tmp_path / first.recordings[0], delimiter=",", skiprows=1)
+    heads = (tmp_path / first.recordings[0]).read_text().splitlines()[0].split(",")
+    at = next(k for k, head in enumerate(heads) if head.startswith("muscle_pressure"))
+    factor = 1e5 if "[bar]" in heads[at] else 1.0
+    assert factor * table[:, at].max() > 1.1 * known
+    assert max(second.numbers["levels_bar"]) < 1.06e-5 * known
+
+
 def test_without_a_device_a_person_plays_it_and_brings_the_recording(
     rig, pool, diagnosed, tmp_path
 ):
@@ -486,7 +503,7 @@ def test_a_rival_that_leaves_its_range_takes_no_score_from_the_others(
         return scored(hypotheses, *given)
 
     monkeypatch.setattr(_loop, "foretold", leaving)
-    given = (rig, log(rig, tmp_path, pool))
+    given = (rig, log(rig, tmp_path, pool, parts=8))
     found = campaign(SimulatedBench(rig), *given, out=tmp_path, bench=FAST, budget=LIMITS)
     (step,) = found.steps
     assert list(step.scores) == ["none"]

@@ -236,10 +236,12 @@ class _Work:
 
     @property
     def pool(self) -> Pool:
-        """Experiments that may be played now."""
+        """Experiments that may be played now, up to pressures recorded before the campaign: a run
+        that went higher than it was planned to is no leave for the next one to do so.
+        """
         return pool_of(
             self.commands,
-            self.recordings,
+            self.before or self.recordings,
             self.folder.played,
             (self.budget, self.folder.spent),
             self.settings,
