@@ -101,9 +101,15 @@ class Bench:
         duration = self.spec.duration if seconds is None else seconds
         if self.spec.rig == "blow_down":
             return still(np.full(round(duration / self.step), -1.0))
-        shape = course(self.rig, name, duration, self.step, rng)
         period = self.step * self.spec.lab.held
-        return shape, Driver(nominal(self.spec.rig)[2], self.rig, period, rng), None
+        return *self.steered(name, duration, period, rng), None
+
+    def steered(
+        self, name: str, duration: float, period: float, rng: np.random.Generator
+    ) -> tuple[Any, Any]:
+        """Course of a recording and its controller, which acts every `period` [s]."""
+        shape = course(self.rig, name, duration, self.step, rng)
+        return shape, Driver(nominal(self.spec.rig)[2], self.rig, period, rng)
 
     def run(self, effects: Sequence[Any], model: dict[str, Any] | None = None) -> dict[int, Record]:
         """Every recording of the plant with effects; of another model than the true one."""

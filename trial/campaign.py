@@ -122,11 +122,9 @@ class _Case:
         step = self.drawn.bench.step
         times = np.arange(round(sent.time[-1] / step) + 1) * step
         held = np.searchsorted(sent.time, times + 1e-6, side="right") - 1
-        places = [f".{side}" for side in SIDES] if self.spec.rig == PAIR else [""]
-        columns = [
-            [Loop.quantise(value) for value in sent.of(place)[held].tolist()] for place in places
-        ]
-        values = np.column_stack(columns) if self.spec.rig == PAIR else np.array(columns[0])
+        places = SIDES if self.spec.rig == PAIR else ("",)
+        columns = [[Loop.quantise(v) for v in sent.of(at)[held].tolist()] for at in places]
+        values = np.column_stack(columns) if len(places) > 1 else np.array(columns[0])
         own = np.random.default_rng([self.spec.seed, index, 79])
         return self.recorded(index, still(values), own)
 
@@ -135,6 +133,15 @@ class _Case:
         own = np.random.default_rng([self.spec.seed, index, 81])
         drive = self.drawn.bench.drive(name, own, seconds)
         return self.recorded(index, drive, own)
+
+    def steps(self) -> list[dict[str, Any]]:
+        """The steps of the arm that chooses its runs, as far as it went."""
+        state = self.work / "campaign" / "campaign.json"
+        return json.loads(state.read_text(encoding="utf-8"))["steps"] if state.is_file() else []
+
+    def lengths(self) -> list[float]:
+        """How long each run of that arm was, of those that are judged [s]."""
+        return [float(step["seconds"]) for step in self.steps() if step["changed"] is not None]
 
     def result(self, arm: str, count: int) -> Path:
         """Where the result of an arm after some runs is kept."""
@@ -192,19 +199,16 @@ def _campaign(case: _Case) -> None:
     write(rig, told)
     words: list[str | Path] = ["campaign", rig, "--log", free, "--out", home]
     words += ["--step", "--unattended", "--minutes", "60", "--air", "1e6", "--runs", str(RUNS)]
-    state, ended = home / "campaign.json", case.result("campaign", RUNS).is_file()
+    ended = case.result("campaign", RUNS).is_file()
     for count in range(RUNS + 1):
         if not ended and _pamrs(words, log):
             break
-        told = json.loads(state.read_text(encoding="utf-8")) if state.is_file() else {"steps": []}
-        steps = told["steps"]
-        judged = [step for step in steps if step["changed"] is not None]
-        lengths = [float(step["seconds"]) for step in judged]
+        steps, lengths = case.steps(), case.lengths()
         if not case.result("campaign", count).is_file():
             # one that ended before says after more runs what it said last
-            own = home / f"step_{count:02d}" if 0 < count <= len(judged) else home
+            own = home / f"step_{count:02d}" if 0 < count <= len(lengths) else home
             case.keep("campaign", count, own / "result.json", sum(lengths[:count]))
-        ended = ended or len(steps) == len(judged)
+        ended = ended or len(steps) == len(lengths)
         if not ended:
             folder = home / f"step_{len(steps):02d}"
             log_of_run = case.played(len(steps), folder / "commands.csv")
@@ -214,16 +218,9 @@ def _campaign(case: _Case) -> None:
             case.keep("campaign", count, case.work / "none", 0.0)
 
 
-def _lengths(case: _Case) -> list[float]:
-    """How long each run of the arm that chooses was [s]."""
-    state = case.work / "campaign" / "campaign.json"
-    told = json.loads(state.read_text(encoding="utf-8")) if state.is_file() else {"steps": []}
-    return [float(step["seconds"]) for step in told["steps"] if step["changed"] is not None]
-
-
 def _other(case: _Case, arm: str) -> None:
     """An arm whose runs do not depend on what was found, as long as those that were chosen."""
-    home, lengths = case.work / arm, _lengths(case)
+    home, lengths = case.work / arm, case.lengths()
     names, total = [FREE], 0.0
     home.mkdir(exist_ok=True)
     for own in ("rig.toml", f"{FREE}.csv"):

@@ -35,13 +35,11 @@ class PairBench(Bench):
     def floors(self) -> Array:
         return self.noise.floor()[list(KINDS)]
 
-    def drive(
-        self, name: str, rng: np.random.Generator, seconds: float | None = None
-    ) -> tuple[Any, Any, Array | None]:
-        duration = self.spec.duration if seconds is None else seconds
+    def steered(
+        self, name: str, duration: float, period: float, rng: np.random.Generator
+    ) -> tuple[Any, Any]:
         shape = pair_course(self.rig, name, duration, self.step, rng)
-        period = self.step * self.spec.lab.held
-        return shape, PairDriver(nominal_pair(), self.rig, period, rng), None
+        return shape, PairDriver(nominal_pair(), self.rig, period, rng)
 
     def plant(self, numbers: Any, effects: Sequence[Any] = ()) -> PairPlant:
         return PairPlant(numbers, effects)

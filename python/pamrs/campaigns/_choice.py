@@ -15,7 +15,13 @@ from pamrs.campaigns._bench import Commands
 from pamrs.campaigns._budget import Budget, Cost, cost_of
 from pamrs.channels import channel_of
 from pamrs.diagnosis import Diagnosis, DiagnosisSettings
-from pamrs.diagnosis.next_experiment import LEAST_BITS, Plan, measurable, plan_diagnosis, propose
+from pamrs.diagnosis.next_experiment import (
+    Plan,
+    measurable,
+    parts_any,
+    plan_diagnosis,
+    propose,
+)
 from pamrs.effects import NONE, UNLISTED
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.experiments import Experiment, experiments_of, library
@@ -255,11 +261,12 @@ def _parting(
             )
         except DiagnosisError:  # none of them can be simulated with every rival
             return None
-    bits = found.expected_information_bits or 0.0
-    if found.protocol is None or found.curves is None or bits < LEAST_BITS:
+    if found.protocol is None or found.curves is None or not parts_any(found):
         return None
     compared = [rival for rival in own.hypotheses if rival[0] in found.curves.predicted]
-    return ProposedRun(allowed[found.protocol.name], found.text, False, compared, bits)
+    return ProposedRun(
+        allowed[found.protocol.name], found.text, False, compared, found.expected_information_bits
+    )
 
 
 def _is_of(own: NextExperiment, allowed: Mapping[str, Experiment]) -> bool:

@@ -13,10 +13,10 @@ from pamrs.channels import block_of
 from pamrs.diagnosis.evidence import Judged
 from pamrs.diagnosis.fit import Problem, concerns, without_term
 from pamrs.diagnosis.next_experiment._choice import (
-    LEAST_BITS,
     Modelled,
     apart,
     outcome_of,
+    parts_any,
     propose,
 )
 from pamrs.diagnosis.next_experiment._differences import noise_of
@@ -253,17 +253,13 @@ def next_to_record(
                 losses=fit_problem.losses,
             )
     pairs = _pairs(asked, ambiguity, hypotheses, simulated.pairs if simulated is not None else [])
-    if simulated is not None and not (simulated.excitation and _parts(simulated, ambiguity)):
+    if simulated is not None and not (
+        simulated.excitation and (parts_any(simulated) or UNLISTED not in ambiguity)
+    ):
         simulated = None  # of what is open one has a model, or what has none is the question
     if simulated is None:
         simulated = NextExperiment(same) if same else _without_models(asked, diagnosis)
     return replace(simulated, pairs=pairs, hypotheses=list(hypotheses), noise=asked.noise)
-
-
-def _parts(simulated: NextExperiment, ambiguity: list[Hypothesis]) -> bool:
-    """True where an experiment parts hypotheses, or all that are open have a model."""
-    bits = simulated.expected_information_bits or 0.0
-    return bits >= LEAST_BITS or UNLISTED not in ambiguity
 
 
 def _first_asked(answer: Answer) -> Part | None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -56,7 +56,7 @@ _MOST_HYPOTHESES = 6
 _SETTLED_ENTROPY = 0.01  # [bit] uncertainty below which no experiment can add to the answer
 # [bit] difference of information that counts; below it the cheaper experiment is better
 _RESOLUTION = 0.02
-LEAST_BITS = 0.05  # [bit] expected information below which an experiment parts nothing
+_LEAST_BITS = 0.05  # [bit] expected information below which an experiment parts nothing
 _MOST_SHOWN = 5  # experiments in the ranking
 _HOPELESS_SHARE = 0.1  # share of the uncertainty below which the text suggests another sensor
 # ratio of distances to the best recording that there is, below which an experiment adds nothing: a
@@ -161,16 +161,32 @@ class Outcome:
         sensitivities that j has there, for some pairs (i, j) of hypotheses.
         """
 
-        def missed(pair: tuple[int, int]) -> ResidualDifference:
-            i, j = pair
-            there = linear(self.problems[i], self.models[j].rig)
-            return difference(self.problems[i], self.models[i].found, there, self.errors)
+        def there(problem: Problem, model: Linear) -> Linear:
+            return linear(problem, model.rig)
 
-        left = self.left | dict(zip(pairs, two_at_a_time(missed, pairs), strict=True))
+        left = self.left | _left_by(pairs, self.problems, self.models, self.errors, there)
         distance = self.distance.copy()
         for pair in pairs:
             distance[pair] = left[pair].total
         return replace(self, left=left, distance=distance)
+
+
+def _left_by(
+    pairs: Sequence[tuple[int, int]],
+    problems: Sequence[Problem],
+    models: Sequence[Linear],
+    errors: Errors,
+    there: Callable[[Problem, Linear], Linear],
+) -> dict[tuple[int, int], ResidualDifference]:
+    """Rest of the recording of hypothesis i that hypothesis j leaves, for pairs (i, j); `there`
+    gives a model on the recording of another one.
+    """
+
+    def missed(pair: tuple[int, int]) -> ResidualDifference:
+        i, j = pair
+        return difference(problems[i], models[i].found, there(problems[i], models[j]), errors)
+
+    return dict(zip(pairs, two_at_a_time(missed, pairs), strict=True))
 
 
 def _telling(problem: Problem, rigs: Sequence[Rig]) -> Problem:
@@ -192,7 +208,7 @@ def outcome_of(
     settings: DiagnosisSettings,
     sensor: str = "",
     runs: Sequence[Simulation] | None = None,
-    shown: Array | None = None,
+    ranking: bool = False,
 ) -> Outcome:
     """Simulate an experiment with every hypothesis, and compare every pair.
 
@@ -215,8 +231,8 @@ def outcome_of(
         One more.
     runs : sequence of Simulation, optional
         The experiment with every hypothesis, where it was simulated before.
-    shown : (h, h) array, optional
-        Squared distances in the recordings that there are, where it is ranked among others.
+    ranking : bool
+        Whether it is only ranked among others.
 
     Raises
     ------
@@ -244,22 +260,25 @@ def outcome_of(
     own = two_at_a_time(lambda one: linear(*one), zip(problems, rigs, strict=True))
     errors = errors_of(problems[0], own[0], [p for q in problems[1:] for p in q.recordings])
 
-    def missed(pair: tuple[int, int]) -> ResidualDifference:
-        i, j = pair
-        return difference(problems[i], own[i].found, elsewhere(problems[i], own[j]), errors)
-
     pairs = list(itertools.permutations(range(len(rigs)), 2))
-    left = {} if shown is None else dict(zip(pairs, two_at_a_time(missed, pairs), strict=True))
+    left = _left_by(pairs, problems, own, errors, elsewhere) if ranking else {}
     distance = np.zeros((len(rigs), len(rigs)))
     for pair, found in left.items():
         distance[pair] = found.total
-    effort = experiment.effort + (settings.sensor_effort if sensor else 0.0)
-    chances, known = [p for _, _, p in hypotheses], 0.0 * distance if shown is None else shown
     outcome = Outcome(
-        *(experiment, sensor, chances, list(runs), left, distance),
-        *(problems, own, errors, effort, known),
+        experiment=experiment,
+        sensor=sensor,
+        probabilities=[p for _, _, p in hypotheses],
+        runs=list(runs),
+        left=left,
+        distance=distance,
+        problems=problems,
+        models=own,
+        errors=errors,
+        effort=experiment.effort + (settings.sensor_effort if sensor else 0.0),
+        shown=np.zeros_like(distance),
     )
-    return outcome if shown is not None else outcome.exactly(pairs)
+    return outcome if ranking else outcome.exactly(pairs)
 
 
 def shown_by(
@@ -277,10 +296,12 @@ def shown_by(
         with contextlib.suppress(DiagnosisError, SimulationError):
             problem = _telling(problem_of(rigs[0], [prepared], channels, settings), rigs)
             models = two_at_a_time(partial(linear, problem), rigs)
+            pairs = list(itertools.permutations(range(len(rigs)), 2))
+            alike = [problem] * len(rigs)  # all answer to what was recorded
             errors = errors_of(problem, models[0])
-            for i, j in itertools.permutations(range(len(rigs)), 2):
-                found = difference(problem, models[i].found, models[j], errors).total
-                shown[i, j] = max(shown[i, j], found)
+            left = _left_by(pairs, alike, models, errors, lambda _, model: model)
+            for pair, found in left.items():
+                shown[pair] = max(shown[pair], found.total)
     return shown
 
 
@@ -379,7 +400,8 @@ def propose(
         if runs is None:
             return None
         try:
-            return outcome_of(experiment, chosen, sound, own, settings, sensor, runs, shown)
+            one = outcome_of(experiment, chosen, sound, own, settings, sensor, runs, ranking=True)
+            return replace(one, shown=shown)
         except (SimulationError, DiagnosisError):
             return None  # it cannot be run there, or nothing is measured on both sides of a block
 
@@ -417,6 +439,11 @@ def propose(
         protocol=protocol_of(best.experiment),
         instruction=f"{_instruction(best)}.",
     )
+
+
+def parts_any(proposal: NextExperiment) -> bool:
+    """True where an experiment is expected to part hypotheses at all."""
+    return (proposal.expected_information_bits or 0.0) >= _LEAST_BITS
 
 
 def _simulated(experiment: Experiment, hypotheses: Sequence[Modelled]) -> list[Simulation] | None:
