@@ -170,11 +170,18 @@ def test_headline_badge_page_and_json_say_the_same(
 
 
 def test_it_is_settled_from_the_probability_that_the_settings_say() -> None:
-    found = _judged("unlisted", {"unlisted": 0.7, "muscle_creep": 0.3})
+    found = _judged("effects", {"muscle_creep": 0.7, "unlisted": 0.3}, effects=["muscle_creep"])
     bold = dataclasses.replace(found, settings=pamrs.DiagnosisSettings(settled=0.65))
     assert not found.answer.settled
     assert bold.answer.settled
-    assert "no effect of the catalogue explains (0.70)" in bold.headline
+
+
+def test_what_has_no_name_is_not_settled_however_sure_it_is_that_something_acts() -> None:
+    found = _judged("unlisted", {"unlisted": 0.97, "muscle_creep": 0.03})
+    assert (found.answer.settled, found.answer.why) == (False, "name")
+    assert words.unsettled_sentence(found) == (
+        "It is not settled: what is missing in the arm has no name."
+    )
 
 
 def test_notebook_html_escapes() -> None:

@@ -32,7 +32,6 @@ NOISE_LEVELS: Final = 2.0
 MENDED, REFITTED, YOURS = "mended model", "refitted model", "your model"
 """Names of the final model: with an effect, a value or a form that was found; with values inside
 their tolerances; as the rig file has it."""
-_WHY: Final = ("", "missed", "sets", "probability", "units")
 
 
 def beyond(size: float, noise: float, error: float) -> float:
@@ -155,7 +154,8 @@ class Answer(Entry):
     why : str
         Why it is not: ``missed`` (the final model still misses too much), ``sets`` (the recordings
         cannot tell several answers apart), ``probability`` (below that from which an answer is
-        settled), ``units`` (channels are read wrong); empty where it is.
+        settled), ``name`` (what is missing has none), ``units`` (channels are read wrong); empty
+        where it is.
     block : str or None
         Where the mismatch of what leads is; None where nothing is missing.
     names : list of str
@@ -244,8 +244,11 @@ def answer_of(
     if missed and not parts:
         names, chance = ("unlisted",), chance_of(chances, ["unlisted"])
     open_ = any(len(p.left) > 1 for p in parts)
-    why = "missed" if missed else "sets" if open_ else "probability"
-    settled = not missed and all(p.sure for p in parts)
+    sure = all(p.sure for p in parts)
+    # that something acts which has no name decides nothing about what it is
+    nameless = any(p.words == ("unlisted",) for p in parts)
+    why = "missed" if missed else "sets" if open_ else "name" if sure else "probability"
+    settled = not missed and sure and not nameless
     verdicts = [*(p.group.verdict for p in every), *["parameters"] * other_law]
     return Answer(
         verdict=case_verdict(verdicts, missed=bool(missed)),

@@ -115,6 +115,8 @@ class EffectFound(Entry):
     events : list of dict
         What happened in single recordings: ``recording``, ``time`` and the effect's other
         parameters, SI.
+    correction : str
+        Form of what its equation lacks, in words, where the model contains one.
     """
 
     id: str
@@ -124,6 +126,7 @@ class EffectFound(Entry):
     probability: float = math.nan
     parameters: dict[str, EffectParameterFound] = field(default_factory=dict)
     events: list[dict[str, Any]] = field(default_factory=list, metadata=OMIT_EMPTY)
+    correction: str = field(default="", metadata=OMIT_EMPTY)
 
     @property
     def term(self) -> str:

@@ -36,7 +36,7 @@ _BADGES = {
     "none": ("nothing missing", "nothing missing, but not settled"),
     "parameters": ("parameters inside their tolerances", "parameters or physics, not settled"),
     "effects": ("missing physics named", "missing physics, the name is not settled"),
-    "unlisted": ("missing physics, not in the catalogue", "missing physics, no name"),
+    "unlisted": ("missing physics, no name", "missing physics, no name"),
     "units": ("", "a channel is in another unit"),
     "wrong": ("a value of the rig file is wrong", "a value of the rig file may be wrong"),
 }
@@ -374,7 +374,16 @@ def render(diagnosis: Findings) -> str:
         title=_typeset(story.title(diagnosis)),
         headline=_typeset(story.headline(diagnosis)),
         paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
-        forms=list(dict.fromkeys(_typeset(u.form) for u in diagnosis.unexplained if u.form)),
+        forms=list(
+            dict.fromkeys(
+                _typeset(form)
+                for form in (
+                    *(u.form for u in diagnosis.unexplained),
+                    *(e.correction for e in diagnosis.effects),
+                )
+                if form
+            )
+        ),
         conditions=[c for c in diagnosis.where.conditions if c.share >= _LEAST_CONDITION],
         stages=words.shown_stages(diagnosis),
         final=diagnosis.answer.model,

@@ -674,7 +674,9 @@ def unsettled_sentence(diagnosis: Findings) -> str:
         place = f" in the {spoken_name(part.block or 'rig')}" if several else ""
         reasons.append(f"these recordings cannot tell {told_apart(part)}{place}")
     for part in answer.parts:
-        if part not in open_ and not part.sure:
+        if part.sure and part.words == ("unlisted",):
+            reasons.append(f"what is missing in the {spoken_name(part.block or 'rig')} has no name")
+        elif part not in open_ and not part.sure:
             what = set_label(list(part.words))
             reasons.append(
                 f"{what} has {chance_words(part)}, and more than {diagnosis.settled} is needed"

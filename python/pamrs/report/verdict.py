@@ -63,7 +63,7 @@ def verdict(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) 
     main += [diagnosis.where.text] if first and first == healthy[:1] else []
     main = [*main, *still] if answer.named else [*still, *main]
     main.append(unsettled_sentence(diagnosis))
-    form = _form(diagnosis, case, forms, sought=sought) if without else ""
+    form = _form(diagnosis, case, forms, sought=sought) if without or forms else ""
     ends = [f"{capital(words)}." for words in not_judged_words(diagnosis)]
     paragraphs = [" ".join(filter(None, main)), unexplained, form, *ends]
     return "\n\n".join(filter(None, paragraphs))
@@ -105,7 +105,8 @@ def _effects(diagnosis: Findings, case: Case) -> str:
     leads = diagnosis.answer.parts[0]
     if leads.group.effects:
         text += f" {diagnosis.where.text}"
-    text += _closed(diagnosis, "With it," if len(found) == 1 else "With them,")
+    if not any(e.correction for e in found):  # else what the model misses with both is told there
+        text += _closed(diagnosis, "With it," if len(found) == 1 else "With them,")
     if unknown_volumes(case.rig):
         text += (
             " The chamber's volume is not known. The recording determines the time constant and "
@@ -178,12 +179,14 @@ def _without_name(diagnosis: Findings, without: Sequence[Part]) -> str:
 
 
 def _form(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
-    """A mismatch without a name as a form, or why there is none."""
+    """What has no name, or what a named equation lacks, as a form, or why there is none."""
     if forms:
+        corrected = any(e.correction for e in diagnosis.effects)
+        what = "What the named equations lack" if corrected else "What is missing"
         return (
-            "What is missing, as a form without a name, which the model contains. "
+            f"{what}, as a form without a name, which the model contains. "
             + " ".join(forms)
-            + _closed(diagnosis, "With it in the model,")
+            + _closed(diagnosis, f"With {'both' if corrected else 'it'} in the model,")
         )
     if sought:
         return "No form of it carries over to other recordings."

@@ -118,7 +118,8 @@ def test_a_name_has_to_leave_less_than_physics_without_a_name() -> None:
 
 def test_a_name_that_leaves_much_may_have_been_missed() -> None:
     """An effect of the catalogue is twice as probable as physics without a name, as far as it takes
-    the mismatch, and a set of two costs what a further name costs.
+    the mismatch, more where it leaves a tenth of the amplitude, as forms that err do; a set of two
+    costs what a further name costs.
     """
     most = SETTINGS.most_probability
 
@@ -128,6 +129,7 @@ def test_a_name_that_leaves_much_may_have_been_missed() -> None:
     taking = [weighed(hypothesis(CREEP, left)) for left in (0.2, 0.5, 0.8)]
     shared = [odds(found, "muscle_creep") for found in taking]
     assert shared == pytest.approx([1.6, 1.0, 0.4], rel=0.1)
+    assert odds(weighed(hypothesis(CREEP, 0.02)), "muscle_creep") > 4.8
     both = weighed(hypothesis({**CREEP, **DAMPING}, 0.5))
     expected = shared[1] * math.exp(-SETTINGS.further_price)
     assert odds(both, "muscle_creep+muscle_rate_damping") == pytest.approx(expected, rel=0.1)

@@ -21,7 +21,8 @@ from pamrs.effects import CATALOGUE, CLOSURE_TERMS, EFFECTS, MEMORY_OF, Term
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
-from tests.diagnosis.asked import SETTINGS, problem_of
+from tests.diagnosis.asked import EXACT, SETTINGS, diagnosed, problem_of
+from tests.diagnosis.held import RIG as SEALED
 from tests.diagnosis.noisy import SHOULDER, driven
 
 CLOSURES = [effect for effect in EFFECTS.values() if not effect.catalogue]
@@ -171,6 +172,30 @@ def test_a_null_keeps_no_excess_and_next_to_no_terms(
         torque = [abs(v) for n, v in found.values.items() if n.startswith("closure_torque.")]
         assert sum(torque) < 0.25
     assert case.evaluations <= 18
+
+
+def test_a_named_leak_with_another_law_is_named_with_a_form_of_what_its_equation_lacks() -> None:
+    hidden = {"constant": 4e-6}  # a pump besides the leak
+    plant = SEALED.with_effect("leak_muscle", {"conductance": 1e-10})
+    plant = plant.with_effect("closure_flow", hidden)
+
+    def hold(role: str, k: int) -> Recording:
+        begin = {"muscle_pressure": (6e5, 4e5, 2.5e5, 5e5)[k]}
+        noise = {"muscle_pressure": 150.0}
+        return driven(plant, f"hold{k}", role, 0.1, {}, noise, [7, k], duration=40.0, initial=begin)
+
+    found = diagnosed(SEALED, hold, ("fit", "fit", "fit", "held_out"), EXACT)
+    answer, (leak,) = found.answer, found.effects
+    assert (answer.named, answer.settled, answer.missed) == (["leak_muscle"], True, [])
+    assert "a flow into the chamber is missing" in leak.correction
+    assert "What the named equations lack, as a form without a name" in found.text
+    assert leak.correction in found.text
+    error = found.fit.held_out["muscle_pressure"]
+    assert error.after < 3.0 * error.noise < 0.01 * error.refit
+    shares = {term.kind: term.share for term in found.budget}
+    assert shares["effect"] > 0.99  # the form corrects the name, and takes what the name leaves
+    assert 0.0 < shares["form"] < 0.01
+    assert {e["id"] for e in found.rig.effects} == {"leak_muscle", "closure_flow"}
 
 
 def test_what_does_not_fit_together_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -113,8 +113,8 @@ class BlockGroup:
     suspects : list of Block
         Blocks that keep an excess.
     closure : FittedHypothesis or None
-        Where no name is likely: a form of what is missing that predicts held-out recordings better
-        than the baseline.
+        Form of what has no name, that predicts held-out recordings better than without it: next to
+        the baseline where no name is likely, else next to the names that lead.
     sought : bool
         Whether one was looked for.
     predicted_gain : dict of Term to float

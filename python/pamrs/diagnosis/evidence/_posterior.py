@@ -62,9 +62,10 @@ def posterior(
     tolerances are off), and so does `UNLISTED`: physics without a name leaves as large a share of
     the mismatch as a right name does. The right name may have been fitted badly, or in a form that
     the catalogue lacks: then it leaves as much, and names share that chance by their weights, each
-    as far as it takes the mismatch with values that its physics has. That a set was missed is less
-    probable than that a single name was, by the price of its further names. A set with an effect
-    whose size is not distinguished from zero names nothing.
+    as far as it takes the mismatch with values that its physics has, and leaves as little as forms
+    that err leave (`_odds_of_form`). That a set was missed is less probable than that a single name
+    was, by the price of its further names. A set with an effect whose size is not distinguished
+    from zero names nothing.
 
     Parameters
     ----------
@@ -92,8 +93,8 @@ def posterior(
     for candidate in named:
         key = candidate.hypothesis
         lost = rare[key] + prior.settings.further_price * (len(candidate.terms) - 1)
-        taken = _share_taken(candidate, start, suspects)
-        weights[key] += missed * alike[key] * taken * math.exp(-lost)
+        form = _odds_of_form(_share_taken(candidate, start, suspects))
+        weights[key] += missed * alike[key] * form * math.exp(-lost)
     total = sum(weights.values())
     out = {h: weight / total for h, weight in weights.items()}
     for hypothesis in [h for h in out if h.terms]:
@@ -112,6 +113,17 @@ def _share_taken(
         for hypothesis in (baseline, candidate)
     )
     return min(1.0, max(0.0, 1.0 - after / before)) if before > 0.0 else 0.0
+
+
+def _odds_of_form(taken: float) -> float:
+    """Odds of a missed name by the share of power that it takes: more than that share where it
+    leaves an amplitude as forms of right names that err do (log-normal), of which the best name for
+    other physics leaves any share, each as probable.
+    """
+    left = max(math.sqrt(1.0 - taken), _FORM_ERROR * math.exp(-(_FORM_SPREAD**2)))
+    far = math.log(left / _FORM_ERROR) / _FORM_SPREAD
+    density = math.exp(-0.5 * far**2) / (math.sqrt(2.0 * math.pi) * _FORM_SPREAD * left)
+    return taken * max(1.0, density)
 
 
 def _tempering(candidates: list[FittedHypothesis], suspects: list[Block]) -> float:

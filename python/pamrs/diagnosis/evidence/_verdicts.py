@@ -11,6 +11,7 @@ from pamrs.diagnosis.evidence._candidates import BlockGroup, FittedHypothesis
 from pamrs.diagnosis.evidence._posterior import joint_posteriors, normalised, terms_of
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
+    CATALOGUE,
     NONE,
     PARAMETERS,
     UNDECIDED,
@@ -53,7 +54,14 @@ class Judged:
     @property
     def named(self) -> tuple[Term, ...]:
         """Effects that are named."""
-        return self.chosen.effects if self.verdict == "effects" else ()
+        return names_of(self.chosen.effects) if self.verdict == "effects" else ()
+
+    @property
+    def form(self) -> FittedHypothesis | None:
+        """Fitted form of what has no name: alone, or next to what is named; None without one."""
+        form = self.group.closure
+        may = form is not None and self.verdict in ("effects", UNLISTED.rest) and not self.wrong
+        return form if form is not None and may and names_of(form.effects) == self.named else None
 
     @property
     def wrong(self) -> tuple[str, ...]:
@@ -65,9 +73,20 @@ class Judged:
         """Effects that are named, and parameters that are named as wrong."""
         return (*self.named, *map(Term, self.wrong))
 
+    @property
+    def named_alone(self) -> FittedHypothesis:
+        """The names as they were fitted without a form; the baseline where there are none."""
+        candidates = self.group.candidates
+        return next((c for c in candidates if c.terms and c.terms == self.named), candidates[0])
+
     def probability(self, term: Term) -> float:
         """Probability of an effect or of a wrong parameter, whatever else acts in these blocks."""
         return min(1.0, sum(p for h, p in self.probabilities.items() if term in h.terms))
+
+
+def names_of(effects: Iterable[Term]) -> tuple[Term, ...]:
+    """Effects of the catalogue among some: not the forms of what has no name."""
+    return tuple(effect for effect in effects if effect.id in CATALOGUE)
 
 
 def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Judged]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -114,7 +114,7 @@ def assemble(
     stages = [(fit_problem, fit_residuals)]
     if held_out_problem is not fit_problem:
         stages.insert(0, (held_out_problem, held_out_residuals))
-    effects = _effects(judged, verdict, fit_problem)
+    effects = _effects(judged, verdict, fit_problem, forms)
     constants = notes_on_constants(conclusion.runs or [], [effect.id for effect in effects])
     start_notes = notes_on_warm_starts(
         fit_problem.blocks,
@@ -204,11 +204,11 @@ def _with_text(
 def _forms(models: Models, fitted: Problem) -> dict[str, str]:
     """Sentences on the fitted form of a mismatch without a name, by block."""
     sentences: dict[str, str] = {}
-    for judged, start, chosen in zip(models.judged, models.starts, models.chosen, strict=True):
-        group = judged.group
-        if judged.verdict == "unlisted" and group.closure is not None:
+    for judged, chosen in zip(models.judged, models.chosen, strict=True):
+        if judged.form is not None:
+            group = judged.group
             part = replace(fitted, blocks=group.blocks)
-            forms = forms_of(chosen.fit, part, start.fit)
+            forms = forms_of(chosen.fit, part, judged.named_alone.fit)
             text = "\n".join(map(form_sentence, forms))
             sentences |= dict.fromkeys((b.name for b in group.blocks), text)
     return sentences
@@ -296,11 +296,16 @@ def _gap(table: dict[str, ChannelError], least: float) -> float | None:
     return None if room < least else max(0.0, min(1.0, (refit - after) / room))
 
 
-def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[EffectFound]:
+def _effects(
+    judged: list[Judged], verdict: str, problem: Problem, forms: Mapping[str, str]
+) -> list[EffectFound]:
     """The effects that are named, the most probable first; without a name those that come
-    closest.
+    closest. Of named ones `forms` say what their equations lack, by block.
     """
     named: dict[Term, tuple[float, FittedHypothesis]] = {}
+    corrections = {
+        effect: forms.get(j.group.blocks[0].name, "") for j in judged for effect in j.named
+    }
     chosen = [j.chosen for j in judged]
     owners = owners_of_effects(chosen)
     in_set = problem.settings.in_set
@@ -326,6 +331,7 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
             probability=p,
             parameters=_effect_parameters(effect, candidate),
             events=_events(effect, candidate),
+            correction=corrections.get(effect, ""),
         )
         for effect, (p, candidate) in sorted(named.items(), key=lambda kv: -kv[1][0])
     ]

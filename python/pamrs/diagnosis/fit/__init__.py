@@ -5,7 +5,8 @@ Public: `Problem`, `Fit`, `Scaling`, `Inflation`,
 `Unfollowed`, `fit`, `residuals`, `changes`, `stacked`,
 `with_priors`, `predicted_with_doubt`, `predicted_by_others` (one recording left out after the
 other), `free_baseline`, `bin_width`, `Key`, `Residuals`, `Stages`;
-`levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where the fit of an effect begins);
+`levenberg_marquardt`; `Start`, `starts_of`, `start_of`, `parts_of`, `CHOSEN` (where the fit of an
+effect begins);
 `form_in`, `entry_of`, `with_effects_of`, `with_entry`, `without_term` (effects of a rig
 and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
@@ -16,6 +17,7 @@ is known of all parameters); `ends_in_tolerances`, `in_tolerances`,
 (standard deviations of coloured residuals).
 """
 
+from pamrs.diagnosis.fit._continuation import parts_of, start_of
 from pamrs.diagnosis.fit._effect_places import (
     acts_in,
     concerns,
@@ -27,7 +29,6 @@ from pamrs.diagnosis.fit._effect_places import (
 from pamrs.diagnosis.fit._fitting import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
-    LEAST_START,
     Events,
     Fit,
     Inflation,
@@ -72,7 +73,6 @@ from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_even
 
 __all__ = [
     "FINAL_STEP_SHARE",
-    "LEAST_START",
     "FIT_BIN_TIME",
     "PIECE_TIME",
     "CHOSEN",
@@ -104,6 +104,7 @@ __all__ = [
     "levenberg_marquardt",
     "look_for_events",
     "moved_value",
+    "parts_of",
     "places_of",
     "predicted_by_others",
     "predicted_with_doubt",
@@ -111,6 +112,7 @@ __all__ = [
     "same_data_in",
     "spread_over_pieces",
     "stacked",
+    "start_of",
     "starts_of",
     "two_at_a_time",
     "with_effects_of",

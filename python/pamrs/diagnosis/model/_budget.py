@@ -23,6 +23,7 @@ from pamrs.diagnosis.fit import (
     form_in,
     known_parameters,
     residuals,
+    with_effects_of,
     with_known,
     without_term,
 )
@@ -153,17 +154,17 @@ def _steps(
 ) -> list[_Step]:
     """The steps of a group after what the nominal model holds."""
     names = _in_order(judged)
+    form = [] if judged.form is None else [_Step("form", (), by_stage["after"])]
     if not names:
-        refit = _Step("parameters", (), by_stage["refit"])
-        if judged.verdict != "unlisted" or judged.group.closure is None:
-            return [refit]
-        return [refit, _Step("form", (), by_stage["after"])]
+        return [_Step("parameters", (), by_stage["refit"]), *form]
     part = replace(problem, blocks=judged.group.blocks)
     known = known_parameters(nominal)
+    if judged.form is not None:
+        final = _without_form(judged, final)
 
     @cache
     def with_terms(present: tuple[tuple[Term, ...], ...]) -> Residuals | None:
-        if present == names:
+        if present == names and not form:
             return by_stage["after"]
         happened = events if events is not None and (events.effect,) in present else None
         lacking = [term for terms in names if terms not in present for term in terms]
@@ -177,10 +178,11 @@ def _steps(
     for n, terms in enumerate(names):
         now = with_terms(names[: n + 1]) or steps[-1].now
         without = with_terms((*names[:n], *names[n + 1 :])) if len(names) > 1 else None
-        change = _difference(by_stage["after"], without) if without else None
+        whole = with_terms(names)
+        change = _difference(whole, without) if whole and without else None
         kind = "effect" if terms[0].is_effect else "wrong_parameter"
         steps.append(_Step(kind, terms, now, change))
-    return steps
+    return [*steps, *form]
 
 
 def _difference(one: Residuals, other: Residuals) -> Residuals:
@@ -190,6 +192,16 @@ def _difference(one: Residuals, other: Residuals) -> Residuals:
         for key, r in one.items()
         if key in other
     }
+
+
+def _without_form(judged: Judged, final: Rig) -> Rig:
+    """The final model with what a group names as it was fitted without a form."""
+    assert judged.form is not None
+    alone = judged.named_alone.fit
+    for term in judged.form.effects:
+        final = without_term(final, term)
+    rig = with_effects_of(final, alone.rig, {entry["id"] for entry in final.effects})
+    return with_known(rig, {name: alone.values[name] for name in alone.moved})
 
 
 def _without_terms(terms: Sequence[Term], known: Mapping[str, Parameter], final: Rig) -> Rig:
@@ -324,8 +336,8 @@ class _Shares:
         self._kept = [self._excess(one) for one in (before, *(stage.now for stage in stages))]
         names = [k for k, stage in enumerate(stages) if stage.kind in _NAMED]
         acting = any(stages[k].acts for k in names)
-        self._first = names[0] if acting else len(stages)
-        self._parts = self._divided(stages[self._first :])
+        self._first, self._end = (names[0], names[-1] + 1) if acting else (len(stages),) * 2
+        self._parts = self._divided(stages[self._first : self._end])
 
     def _excess(self, one: Excess, noise: float = 1.0) -> Array:
         """Excess variance beyond a variance of noise, as it is and in each draw."""
@@ -352,9 +364,9 @@ class _Shares:
         """Share of a term: what it takes after the one before it; names divide what all of them
         take.
         """
-        if k < self._first:
+        if not self._first <= k < self._end:
             return self._with_interval(self._kept[k] - self._kept[k + 1])
-        taken = self._kept[self._first] - self._kept[-1]
+        taken = self._kept[self._first] - self._kept[self._end]
         return self._with_interval(taken * self._parts[k - self._first])
 
     def unexplained(self) -> tuple[float, list[float]]:

@@ -27,7 +27,6 @@ from pamrs.diagnosis.evidence import (
 )
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
-    LEAST_START,
     Events,
     Key,
     Problem,
@@ -35,7 +34,9 @@ from pamrs.diagnosis.fit import (
     depends,
     fit,
     known_parameters,
+    parts_of,
     residuals,
+    start_of,
     with_entry,
     with_known,
     without_term,
@@ -44,7 +45,6 @@ from pamrs.diagnosis.model._budget import budget, owners_of_effects, owners_of_p
 from pamrs.diagnosis.model._free_run import KnownValues, free_run
 from pamrs.diagnosis.noise import NoiseLevel, inflation_of
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.diagnosis.search import parts_of, start_of
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, NONE, PARAMETERS, UNDECIDED, UNLISTED, Hypothesis, Term
 from pamrs.errors import SimulationError
@@ -284,10 +284,10 @@ def _needless(models: Models, settings: DiagnosisSettings) -> set[int]:
 
 
 def _without_addition(group: BlockGroup, judged: Judged) -> BlockGroup:
-    """Group without what it adds to the model: its name, or the form of what has none."""
-    if judged.added:
-        return put_aside(group, judged.chosen.hypothesis)
-    return replace(group, closure=None)
+    """Group without what it adds to the model: the form of what has no name, or else its name."""
+    if judged.form is not None:
+        return replace(group, closure=None)
+    return put_aside(group, judged.chosen.hypothesis)
 
 
 def _worse_than_file(
@@ -350,8 +350,7 @@ def _blamed(judged: list[Judged], spoilt: Collection[str]) -> set[int]:
 
 def _additions(judged: Judged) -> tuple[Term, ...]:
     """Effects that a group adds to the model."""
-    closure = judged.group.closure if judged.verdict == "unlisted" else None
-    return judged.named or (closure.effects if closure is not None else ())
+    return judged.form.effects if judged.form is not None else judged.named
 
 
 def _models(nominal: Rig, fit_problem: Problem, judged: list[Judged], verdict: str) -> Models:
@@ -409,10 +408,9 @@ def _known(models: Models) -> KnownValues:
 
 
 def _model_of(judged: Judged, start: FittedHypothesis) -> FittedHypothesis:
-    """Candidate of a group for the model: what is named, else a nameless form, else parameters."""
-    if judged.named or judged.wrong:
-        return judged.chosen
-    return (judged.group.closure if judged.verdict == "unlisted" else None) or start
+    """Candidate of a group for the model: what is named, with a form of what has no name."""
+    named = judged.chosen if judged.named or judged.wrong else start
+    return judged.form or named
 
 
 def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:
@@ -488,9 +486,7 @@ def _with_common_zeros(
         )
         if differ and candidate.fit.events is None:
             effects = candidate.fit.effects
-            free, fixed, forms = parts_of(
-                start_of(candidate.fit, effect, LEAST_START) for effect in effects
-            )
+            free, fixed, forms = parts_of(start_of(candidate.fit, effect) for effect in effects)
             settled = {n: other.values[n] for n, other in common.items()}
             inflation = inflation_of(part, candidate.fit, judged[k].group.noise_level)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted

@@ -1,11 +1,11 @@
 """Hypotheses tried for a mismatch: effects alone and in sets, wrong values, forms without a name.
 
-Public: `examine` (all of it, for some blocks), `Mismatch`, `Attempts`, `parts_of`, `start_of`
-(fits), `refitted`, `with_inflation` (the baseline alone), `find_misread`, `Reading`,
+Public: `examine` (all of it, for some blocks), `Mismatch`, `Attempts` (fits),
+`refitted`, `with_inflation` (the baseline alone), `find_misread`, `Reading`,
 `reading_errors` (other units of channels), `find_closure`, `free_suspects`, `suspected_values`.
 """
 
-from pamrs.diagnosis.search._attempts import Attempts, parts_of, start_of
+from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._baseline import refitted, with_inflation
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._examine import Mismatch, examine
@@ -20,10 +20,8 @@ __all__ = [
     "find_closure",
     "free_suspects",
     "find_misread",
-    "parts_of",
     "reading_errors",
     "refitted",
-    "start_of",
     "suspected_values",
     "with_inflation",
 ]

@@ -21,7 +21,6 @@ from pamrs.diagnosis.evidence import (
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
-    LEAST_START,
     Events,
     Fit,
     Inflation,
@@ -29,17 +28,17 @@ from pamrs.diagnosis.fit import (
     Problem,
     Start,
     acts_in,
-    entry_of,
     fit,
     fit_events,
-    form_in,
     free_baseline,
     known_parameters,
     look_for_events,
+    parts_of,
     places_of,
     predicted_by_others,
     predicted_with_doubt,
     residuals,
+    start_of,
     with_effects_of,
     without_term,
 )
@@ -53,8 +52,9 @@ from pamrs.diagnosis.noise import (
     usual_inflation,
 )
 from pamrs.diagnosis.prepare import Block, Residual
+from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import Term, effect_of, find_parameter, ports_of
+from pamrs.effects import Term, effect_of, ports_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -158,7 +158,7 @@ class Attempts:
 
     def start_of(self, fitted: Fit, effect: Term) -> Start:
         """Start of another fit from an effect as it was fitted."""
-        return start_of(fitted, effect, LEAST_START)
+        return start_of(fitted, effect)
 
     def starts_of(self, candidate: FittedHypothesis) -> list[Start]:
         """Starts of another fit from each effect of a candidate."""
@@ -309,6 +309,26 @@ class Attempts:
             places=sum(math.log(len(self.terms_of(e.id))) for e in effects),
             likelihood=self.likelihood_of(fitted.residuals, held_out_residuals),
         )
+
+    def fit_form(
+        self, base: FittedHypothesis, blocks: list[Block], say: Callable[[str], None]
+    ) -> FittedHypothesis | None:
+        """Fit a form of what a baseline leaves of some blocks, or names, which are refitted with
+        it; None where there is none, or the model cannot be run with it.
+        """
+        try:
+            closure = find_closure(
+                self.fit_problem,
+                self.nominal,
+                base.fit,
+                self.inflation_of(base.fit),
+                blocks,
+                say,
+                self.noise_level,
+            )
+            return None if closure is None else self.assess(closure.effects, closure)
+        except SimulationError:
+            return None
 
     def terms_of(self, effect: str) -> list[Term]:
         """Terms of an effect: everywhere, and at each place that the blocks can distinguish."""
@@ -555,47 +575,6 @@ class Attempts:
             candidate.terms, lambda: self._continue(starts, fitted, candidate.wrong, *end)
         )
         return candidate if polished is None else replace(polished, gain=candidate.gain)
-
-
-def parts_of(
-    starts: Iterable[Start],
-) -> tuple[dict[str, float], dict[str, float], dict[Term, str]]:
-    """Free parameters, fixed parameters and forms of several starts."""
-    free: dict[str, float] = {}
-    fixed: dict[str, float] = {}
-    forms: dict[Term, str] = {}
-    for start in starts:
-        free |= start.free
-        fixed |= start.fixed
-        forms[start.effect] = start.form
-    return free, fixed, forms
-
-
-def start_of(fitted: Fit, effect: Term, least: float) -> Start:
-    """Start of another fit from an effect as it was fitted, fixed parameters included.
-
-    ``least`` is the share of a typical size that a parameter has at the least.
-    """
-    free = {
-        name: _off_zero(name, value, least)
-        for name, value in fitted.values.items()
-        if effect_of(name) == effect
-    }
-    entry = entry_of(fitted.rig, effect)
-    fixed = {
-        f"{effect}.{n}": v
-        for n, v in entry["parameters"].items()
-        if f"{effect}.{n}" not in fitted.values
-    }
-    return Start(effect, free, fixed, (), False, form_in(fitted.rig, effect))
-
-
-def _off_zero(name: str, value: float, share: float) -> float:
-    """Value to start a parameter from, at least a share of its typical size: zero has no scale."""
-    parameter = find_parameter(name)
-    typical = parameter.default or parameter.starts[-1]
-    least = share * max(typical, parameter.lower, 1e-3 * parameter.starts[0])
-    return value if abs(value) > least else least
 
 
 def _emptier_than_empty(problem: Problem, fitted: Fit) -> bool:

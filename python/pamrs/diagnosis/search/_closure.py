@@ -1,4 +1,5 @@
-"""Sparse closure at the located cut: the fitted form of a mismatch that no effect explains.
+"""Sparse closure at the located cut: the fitted form of what no effect explains, or of what the
+equations of named effects lack.
 
 A closure is linear in its coefficients, so that at zero (where it changes nothing) one evaluation
 gives what every term of its dictionary would do to the residuals, and a few more what those with
@@ -18,7 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._arrays import Array, Mask
-from pamrs.diagnosis.fit import Fit, Key, Problem, fit, residuals, stacked, with_priors
+from pamrs.diagnosis.fit import (
+    Fit,
+    Key,
+    Problem,
+    fit,
+    parts_of,
+    residuals,
+    stacked,
+    start_of,
+    with_priors,
+)
 from pamrs.diagnosis.noise import NoiseLevel, correlation_time, inflation_of
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import (
@@ -72,7 +83,7 @@ class _Choice:
     shapes : dict of str to float
         Dotted shapes of the memories that they need.
     shift : (b,) array
-        What the baseline parameters move with them, in tolerances.
+        What the parameters of the baseline and of its effects move with them, in their scales.
     """
 
     values: dict[str, float]
@@ -107,7 +118,8 @@ def find_closure(
     nominal : Rig
         Nominal model.
     baseline : Fit
-        Its fit to the problem without effects, with sensitivities.
+        Its fit to the problem, with sensitivities; effects that it has are refitted with the
+        closure.
     inflation : dict of str to float
         Variance of each block's binned residual relative to white sample noise, as in
         :func:`pamrs.diagnosis.fit.fit`.
@@ -121,19 +133,14 @@ def find_closure(
     Returns
     -------
     Fit or None
-        Model with the closure (effects ``closure_*``), baseline refitted with it; None where no
-        term is worth its price.
+        Model with the closure (effects ``closure_*``, the last ones), baseline refitted with it;
+        None where no term is worth its price.
 
     Raises
     ------
     DiagnosisError
-        For a block without a closure, or a baseline with effects.
+        For a block without a closure.
     """
-    if baseline.effects:
-        raise DiagnosisError(
-            f"baseline.effects = {', '.join(map(str, baseline.effects))} is not allowed: a closure "
-            "needs the fit without effects"
-        )
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
@@ -246,7 +253,7 @@ def _at_first_fit(
     for closure in closures.values():
         if Term(closure) not in fitted.effects:
             rig = rig.with_effect(closure)
-    shapes = {e["id"]: e["parameters"] for e in rig.effects}
+    shapes = {e["id"]: e["parameters"] for e in rig.effects if e["id"] in CLOSURE_TERMS}
     candidates = [
         _ShapedTerm(
             closure, term, shapes[closure][MEMORY_OF[term.kind]] if term.kind in MEMORY_OF else None
@@ -266,7 +273,7 @@ def _at_first_fit(
         rig=fitted.rig,
         values=values,
         residuals=baseline_residuals,
-        moved={name: fitted.moved[name] for name in names},
+        moved={name: fitted.moved[name] for name in baseline.moved},
     )
     _, every = stacked(problem, evaluated, inflation)
     assert every is not None
@@ -282,7 +289,10 @@ class _StackedFit:
     rows : (n,) array
         Stacked residuals.
     freedom : (n, b) array
-        Their derivative with respect to each baseline parameter in tolerances.
+        Their derivative with respect to each parameter of the baseline in tolerances, and of its
+        effects in their scales.
+    prior : (b, b) array
+        Derivative of the residual of each prior; zero for parameters of effects.
     moved : (b,) array
         Distance of each from nominal in tolerances, the residual of its prior.
     recording : (n,) int array
@@ -293,6 +303,7 @@ class _StackedFit:
 
     rows: Array
     freedom: Array
+    prior: Array
     moved: Array
     recording: NDArray[np.int64]
     series: list[slice]
@@ -322,7 +333,8 @@ class _StackedFit:
         return _StackedFit(
             rows,
             freedom,
-            np.array([fitted.moved[name] for name in names]),
+            np.diag([float(name in fitted.moved) for name in names]),
+            np.array([fitted.moved.get(name, 0.0) for name in names]),
             np.concatenate(recording),
             series,
         )
@@ -416,7 +428,7 @@ def _select(
     target = np.concatenate([rows, frame.moved])
     wide = np.concatenate([unit, np.zeros((b, unit.shape[1]))])
     if b:
-        q, _ = np.linalg.qr(np.concatenate([frame.freedom, np.eye(b)]))
+        q, _ = np.linalg.qr(np.concatenate([frame.freedom, frame.prior]))
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
     crossed = _LeaveOneOut.of(frame, rows, unit)
@@ -503,7 +515,7 @@ def _solved(
 ) -> _Choice:
     """Coefficients of the terms that are kept, the baseline moving freely inside its tolerances."""
     b = frame.freedom.shape[1]
-    baseline = np.concatenate([frame.freedom, np.eye(b)])
+    baseline = np.concatenate([frame.freedom, frame.prior])
     terms = np.concatenate([unit[:, taken], np.zeros((b, len(taken)))])
     design = np.concatenate([baseline, terms], axis=1)
     solution, *_ = np.linalg.lstsq(design, -np.concatenate([rows, frame.moved]), rcond=1e-10)
@@ -548,24 +560,28 @@ class _LeaveOneOut:
     ----------
     grams : (r, b + m + 1, b + m + 1) array
         Inner products of baseline columns, terms and rows in each recording.
-    prior : (b,) array
-        Residual of each baseline parameter's prior.
+    prior : (b, b) array
+        Derivative of the residual of each parameter's prior.
+    moved : (b,) array
+        That residual.
     """
 
     grams: Array
     prior: Array
+    moved: Array
 
     @staticmethod
     def of(frame: _StackedFit, rows: Array, unit: Array) -> _LeaveOneOut:
         everything = np.concatenate([frame.freedom, unit, rows[:, None]], axis=1)
         parts = [everything[frame.recording == k] for k in np.unique(frame.recording)]
-        return _LeaveOneOut(np.array([part.T @ part for part in parts]), frame.moved)
+        grams = np.array([part.T @ part for part in parts])
+        return _LeaveOneOut(grams, frame.prior, frame.moved)
 
     def left_out(self, terms: Sequence[int]) -> float:
         """Misfit of each recording by the baseline and terms that the others ask for, summed; with
         one recording the misfit itself.
         """
-        b = self.prior.size
+        b = self.moved.size
         index = np.array([*range(b), *(b + t for t in terms)], dtype=np.int64)
         total = self.grams.sum(axis=0)
         misfit = 0.0
@@ -573,8 +589,8 @@ class _LeaveOneOut:
             rest = total - gram if len(self.grams) > 1 else total
             normal = rest[np.ix_(index, index)].copy()
             right = -rest[index, -1].copy()
-            normal[np.arange(b), np.arange(b)] += 1.0
-            right[:b] -= self.prior
+            normal[:b, :b] += self.prior
+            right[:b] -= self.moved
             solution = np.linalg.lstsq(normal, right, rcond=1e-12)[0]
             misfit += float(
                 gram[-1, -1]
@@ -595,8 +611,10 @@ def _fit_terms(
     """The chosen terms and the shapes of their memories in the nonlinear model; None where it
     cannot be run.
     """
-    effects = tuple(dict.fromkeys(filter(None, map(effect_of, chosen.values))))
-    every = {f"{e}.{p.name}": p for e in effects for p in e.info.parameters}
+    closures = tuple(dict.fromkeys(filter(None, map(effect_of, chosen.values))))
+    every = {f"{e}.{p.name}": p for e in closures for p in e.info.parameters}
+    named = [start_of(warm, effect) for effect in warm.effects if effect not in closures]
+    free, held, forms = parts_of(named)
     fixed = {
         n: 0.0 if p.neutral == 0.0 else p.default
         for n, p in every.items()
@@ -611,15 +629,17 @@ def _fit_terms(
         shifted = {
             n: warm.values[n] + share * float(x) * warm.scales[n]
             for n, x in zip(names, chosen.shift, strict=True)
+            if n in warm.moved
         }
         try:
             fitted = fit(
                 problem,
                 nominal,
-                effects,
-                starts,
+                (*(start.effect for start in named), *closures),
+                free | starts,
                 inflation,
-                fixed=fixed,
+                fixed=held | fixed,
+                forms=forms,
                 warm=replace(warm, values=shifted),
                 evaluations=evaluations,
             )

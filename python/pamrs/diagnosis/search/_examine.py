@@ -39,7 +39,6 @@ from pamrs.diagnosis.search._baseline import (
     is_marginal,
     refit_blocks,
 )
-from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._hypotheses import (
     best_of_each,
     fit_candidates,
@@ -55,6 +54,7 @@ from pamrs.diagnosis.search._sets import Say, Search
 from pamrs.diagnosis.search._wrong_parameters import free_suspects
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis
 from pamrs.errors import SimulationError
+from pamrs.findings import MOST_MISSED
 from pamrs.rig import Rig
 
 _FROM_PROBABILITY = 0.3  # probability of unlisted from which a form is looked for (decision 4)
@@ -361,13 +361,22 @@ def _leading(weighed: Mapping[Hypothesis, float]) -> Hypothesis:
 
 
 def _add_form(group: BlockGroup, refit: Refit, say: Say, tell: Say) -> BlockGroup:
-    """Add a form of what is missing to a group, where no name is likely and a form carries over."""
-    attempts, start = refit.attempts, refit.start
+    """Add a form of what is missing to a group, where that carries over: instead of a name
+    where none is likely, else next to the names that lead, whose equations are not quite the rig's.
+    """
+    attempts, base = refit.attempts, refit.start
     # what is missing in a chamber is missing in the temperature of its gas too
     suspects = [b for b in attempts.suspects if b.kind != "temperature"] or attempts.suspects
-    if group.probabilities[UNLISTED] < _FROM_PROBABILITY or len({b.kind for b in suspects}) < len(
-        suspects
-    ):
+    leading = _leading(group.probabilities)
+    if leading.terms:
+        base = next(c for c in group.candidates if c.hypothesis == leading)
+        left = base.held_out_excess
+        suspects = [b for b in suspects if left[b.name].systematic > MOST_MISSED]
+        if base.wrong or base.fit.events is not None:
+            return group
+    elif group.probabilities[UNLISTED] < _FROM_PROBABILITY:
+        return group
+    if not suspects or len({b.kind for b in suspects}) < len(suspects):
         return group  # of two chambers one form would have to serve both
     if any(b.closure is None for b in suspects):
         tell(
@@ -376,25 +385,16 @@ def _add_form(group: BlockGroup, refit: Refit, say: Say, tell: Say) -> BlockGrou
         )
         return group
     group = replace(group, sought=True)
-    closure = find_closure(
-        attempts.fit_problem,
-        attempts.nominal,
-        start.fit,
-        refit.inflation,
-        suspects,
-        say,
-        attempts.noise_level,
-    )
-    if closure is None:
-        return group
-    try:
-        assessed = attempts.assess(closure.effects, closure)
-    except SimulationError:
-        return group
+    form = attempts.fit_form(base, suspects, say)
     # what does not carry over to recordings that were held out is no form of anything
-    if share_left(assessed, start, suspects) > _MOST_SHARE_LEFT:
+    if form is None or share_left(form, base, suspects) > _MOST_SHARE_LEFT:
         return group
-    return replace(group, closure=assessed)
+    if leading.terms:
+        by_name, by_both = (share_left(c, refit.start, suspects) for c in (base, form))
+        absent = is_absent(form, attempts.settings.most_tolerances)
+        if absent or by_name - by_both > 1.0 - by_name:
+            return group  # it would be the form that explains, and not the name
+    return replace(group, closure=form)
 
 
 def _split_by_names(group: BlockGroup, attempts: Attempts, prior: Prior) -> list[BlockGroup]:
