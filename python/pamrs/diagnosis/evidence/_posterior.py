@@ -42,13 +42,13 @@ LEAST_TEMPERING, _MOST_TEMPERING, _NOISE_TEMPERING = 0.01, 0.1, 0.3
 # share of what it explains that a right name leaves, as forms of equations err (decision 14)
 _FORM_ERROR = 0.1
 _FORM_SPREAD = math.log(3.0)  # spread of the logarithm of that share: a factor (decision 14)
-# [noise levels of bin means] error beside whatever is explained: these levels err (decision 14)
+# [noise levels of bin means] error whatever is explained: these levels err (decision 14)
 _LEAST_ERROR = 0.1
 _STRAIN_SHARE = 0.5  # share of the priors' sum of squares that counts (decision 14)
 _ALIKE_STDS = 3.0  # [standard deviations] by which the values of one name in two groups may differ
 # share of the larger by which values differ however well known, as models err: a factor of two
 _ALIKE_SHARE = 0.5
-_COUNTED = 1e-6  # probability from which a hypothesis of one group is put beside those of others
+_COUNTED = 1e-6  # probability from which a hypothesis of one group is put with those of others
 
 
 def posterior(

@@ -27,7 +27,7 @@ from pamrs.report.verdict import unknown_volumes
 from pamrs.rig.schema import split_name
 from pamrs.units import in_words
 
-_MOVED_TOLERANCES = 2.0  # [tolerances] movement of a parameter beside an effect from which it is
+_MOVED_TOLERANCES = 2.0  # [tolerances] movement of a parameter, with an effect, that is reported
 # relative scatter of an effect's size between recordings from which it is reported
 _SCATTER = 0.35
 # share of the ambient pressure within which a recording that begins at it may be absolute
@@ -36,7 +36,7 @@ _AMBIENT_SHARE = 0.01
 _DOUBTED_PRESSURE = 1e4
 # probability of no mismatch from which the text says that there may be none
 _NO_MISMATCH_PROBABILITY = 0.1
-# share of the excess over share of the time from which a condition is told
+# share of the excess over share of the time from which a condition is named
 TELLING_CONDITION = 1.15
 
 

@@ -460,7 +460,7 @@ def _fit_jointly(
     except SimulationError:
         return None
     covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True))
-    measured = values.size - count  # priors stand behind
+    measured = values.size - count  # priors come after
     wide = pieces_spread(
         values[:measured], jacobian[:measured], covariance, pieces_of(problem, by_block)
     )

@@ -808,7 +808,7 @@ def _doubted(value: float, stated: Parameter, settings: DiagnosisSettings) -> li
     ]
 
 
-# samples beside one at its sensor's end, masked as well: their noise is cut off on one side
+# samples next to one at its sensor's end, masked as well: their noise is cut off on one side
 _RAIL_SAMPLES = 3
 
 

@@ -215,7 +215,7 @@ def _shared_mask(alignment: _SharedRows) -> Mask:
         new_rows[first:last] = last - first >= LEAST_SAMPLES
     for first, last in stretches(~new_rows & ~shared & alignment.inside):
         neighbours = new_rows[[k for k in (first - 1, last) if 0 <= k < new_rows.size]]
-        # what cannot be told is new where noise of its own is on both sides; so is part of a window
+        # what is not clear is new where noise of its own is on both sides; so is part of a window
         part = last - first < WINDOW_SAMPLES
         new = neighbours.any() if part else neighbours.size == 2 and neighbours.all()
         shared[first:last] = not new
@@ -268,14 +268,14 @@ _LEAST_ALIVE = 0.2
 WINDOW_SAMPLES = 64
 LEAST_SAMPLES = 192  # samples that are shared at the least: three windows
 _LAGS = 8  # shifts in time that are looked at
-# neighbours on either side by which a sample is told without the other recording
+# neighbours on either side by which a sample is predicted without the other recording
 _NEIGHBOURS = 4
 # samples of a block that is looked for in a recording whose clock goes otherwise
 _BLOCK_SAMPLES = 256
 
 
 _SET: Final = ("valve_command", "supply_command", "reference")
-_TAPS: Final = 8  # deviations on either side by which one of the other recording is told
+_TAPS: Final = 8  # deviations on either side by which one of the other recording is predicted
 _SOON: Final = 4  # samples within which a flip of a converter goes back
 _ROWS: Final = 20_000  # rows from which a linear combination of a few columns is found
 _TINY: Final = 1e-300  # keeps a quotient finite
@@ -390,7 +390,7 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     moves = inner & ~(np.r_[False, flat] & np.r_[flat, False])
     counted = moves if moves.sum() > 4 * _NEIGHBOURS else inner  # a rest says nothing of the noise
     use, deviations, weights = counted, centred, np.zeros(offsets.size)
-    for _ in range(4):  # steps of the signal do not say how noise is told
+    for _ in range(4):  # steps of the signal do not say how noise is predicted
         if use.sum() < 2 * offsets.size:
             break
         weights, follows = _prediction_by(centred, offsets, centred, use)
@@ -403,7 +403,7 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     coarse = step if step > _COARSE_STEP * noise else 0.0
     if not size > 1e-12 * float(np.abs(centred).max()):
         return _Deviations(filled, known, nothing, coarse)
-    # a step of the signal is left in all samples beside it
+    # a step of the signal is left in all samples around it
     steps = uniform_filter1d((counted & ~use).astype(float), 4 * _NEIGHBOURS + 1) > 1e-6
     return _Deviations(filled, known, np.where(inner & ~steps, deviations / size, 0.0), coarse)
 

@@ -30,11 +30,11 @@ _SPECTRUM_SAMPLES = 64
 _LEAST_SPECTRA = 16
 # variance share below which the quietest band is the noise: white noise has 0.38 (decision 22)
 _BAND_SHARE = 0.25
-# [s] stretches beside a start that give value and slope; the longest that fits (decision 22)
+# [s] stretches at a start that give value and slope; the longest that fits (decision 22)
 _START_REACHES = (0.04, 0.08, 0.16)
 # variance over that of the noise up to which a cubic fits such a stretch (decision 22)
 _START_MISFIT = 1.1
-# deviations of that variance allowed beside it, for the shortest stretch (decision 22)
+# deviations of that variance allowed on top, for the shortest stretch (decision 22)
 _START_FIRST_STDS = 2.0
 _START_LONGER_STDS = 1.5  # deviations allowed for longer stretches (decision 22)
 # deviations by which slopes of two stretches may differ (Lepski 1991, decision 22)

@@ -71,9 +71,9 @@ _MOST_WEIGHTINGS = 4
 _SCATTER_STDS = 2.0
 # share of the nominal stable step below which no events are sought: too slow (decision 103)
 _LEAST_STEP_SHARE = 0.2
-_MOST_TURNS = 3  # in which events and the effects beside them are fitted in turn
+_MOST_TURNS = 3  # in which events and the effects with them are fitted in turn
 _LEAST_TURN = 0.8  # share of the sum of squares above which a further turn is not worth it
-_EVALUATIONS_WITH_EVENTS = 6  # evaluations of the fit of persistent effects beside events that stay
+_EVALUATIONS_WITH_EVENTS = 6  # evaluations of the fit of persistent effects with events that stay
 _FIRST_EVALUATIONS = 5  # evaluations of such a fit (decision 13)
 # evaluations of a freed parameter's first fit: is it worth a whole one (decision 25)
 _WRONG_PARAMETERS_FIRST_EVALUATIONS = 6
@@ -167,9 +167,9 @@ class Attempts:
     def fit_events(self, effect: Term, candidate: FittedHypothesis) -> FittedHypothesis | None:
         """Fit an effect with times of its own in every recording, next to a candidate's effects."""
         if effect.id in {e.id for e in candidate.effects}:
-            return None  # it would replace what it is to happen beside
+            return None  # it would replace what it is to happen with
         if candidate.fit.events is not None or candidate.wrong:
-            return None  # what happens beside other events, or wrong values, is not fitted
+            return None  # what happens with other events, or wrong values, is not fitted
         stiffest = _LEAST_STEP_SHARE * self.fit_problem.core.stable_step
         if core_rig(candidate.fit.rig, self.fit_problem.core).stable_step < stiffest:
             return None  # it would take too long

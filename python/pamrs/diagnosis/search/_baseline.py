@@ -54,9 +54,9 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-_MOST_OWN_WEIGHTINGS = 8  # of a refit beside recordings that count by their own
+_MOST_OWN_WEIGHTINGS = 8  # of a refit where recordings count by their own
 _LEAST_OTHERS = 2  # recordings that have to agree against one: a single one is fitted by anything
-_DRAGGED = 25.0  # times as large a sum of squares of the others beside one recording as without it
+_DRAGGED = 25.0  # times as large a sum of squares of the others with one recording as without it
 # held-out variance over noise that is a mismatch the fitted hardly show (decision 20)
 _HELD_OUT_RATIO = 2.0
 # variance over that of the noise that the fitted recordings must have for that (decision 20)
@@ -81,7 +81,7 @@ def with_inflation(
         return first, inflation
     fitted = thorough(problem, nominal, inflation, first)
     for _ in range(_MOST_OWN_WEIGHTINGS if inflation.apart else 0):
-        # what stands apart had moved the baseline, and that missed the others
+        # what is apart had moved the baseline, and that missed the others
         last, inflation = inflation, inflation_of(problem, fitted, noise_level)
         fitted = thorough(problem, nominal, inflation, fitted)
         if all(CORRELATED_VARIANCE * now >= last[name] for name, now in inflation.items()):

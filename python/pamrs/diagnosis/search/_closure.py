@@ -36,7 +36,7 @@ from pamrs.rig import Rig
 # share of the misfit that it may leave: with less gain it mends the smoothing of drives
 _MOST_MISFIT_SHARE = 0.75
 _MOST_TERMS = 6  # terms that it may have: more is no form that a person reads
-_LEAST_POWER = 1e-6  # share of a term left beside the baseline and the terms before it: rounding
+_LEAST_POWER = 1e-6  # share of a term left next to the baseline and the terms before it: rounding
 _EVALUATIONS = 5  # evaluations of the fit of the chosen terms at the most
 # share of the linear estimate from which the fit is tried where the whole of it gains nothing
 _SHRUNK_SHARE = 0.4

@@ -79,7 +79,7 @@ def refit_with_smaller_curve_error(refit: Refit, tell: Say) -> Refit | None:
     if least is None:
         return None
     state = screen_mismatch(least, tell)
-    # a few steps show whether the error is smaller beside an effect, which is then fitted anew
+    # a few steps show whether the error is smaller with an effect, which is then fitted anew
     screened = state.search.screened
     starts = [
         start

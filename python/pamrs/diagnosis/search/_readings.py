@@ -38,9 +38,9 @@ _SUSPECT = 3.0
 # share of that excess which a unit may leave after one step of the parameters to be worth a fit
 _PROMISING = 0.3
 _FITTED = 4  # units that are fitted, the most promising first; others leave more
-# share of the excess that a unit may leave: physics may stand beside it, told from others
+# share of the excess that a unit may leave: physics may be there too, found by others
 _LEFT = 0.05
-# log of a small factor (bar, atmosphere, kgf/cm2), which parameters take up: a free one tells
+# log of a small factor (bar, atmosphere, kgf/cm2), which parameters absorb: a free one tells
 _SMALL_STEP = 0.1
 # standard errors by which such a factor beats none: some ten are tried, in coloured noise
 _CLEAR_STDS = 5.0

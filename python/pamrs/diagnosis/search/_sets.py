@@ -322,7 +322,7 @@ class _Growing:
         least = max(LEAST_GAIN, _PARTNER_SHARE * tangent.power_left)
         likely = [e for e, scores in ranked.items() if scores[0].gain > least]
         best = _one_place_each(likely)[:_MOST_PARTNERS]
-        # what is left in one block may be little beside what another one had: an effect of that
+        # what is left in one block may be little next to what another one had: an effect of that
         # block alone is tested by itself
         for block in _blocks_untouched(base, self.search.start, attempts) if alone else []:
             in_block = [

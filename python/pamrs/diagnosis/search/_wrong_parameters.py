@@ -39,12 +39,12 @@ FURTHER_SHARE = 0.2
 _LEAST_PREDICTED_GAIN = 9.2
 # freed parameters, and pairs of them, that are fitted to their end (decision 25)
 _MOST_FINISHED = 3
-# times the misfit of a freed parameter that leaves noise, for others fitted beside it
+# times the misfit of a freed parameter that leaves noise, for others fitted with it
 _NEAR_MISFIT = 2.0
 _SUSPECTED_TOLERANCES = 1.0  # [tolerances] moved by a value whose freeing is looked at
-# [tolerances] moved by a suspect beside effects, which take a part of what it would do
+# [tolerances] moved by a suspect with effects, which take a part of what it would do
 _FAR_TOLERANCES = 2.0
-_MOST_FAR = 2  # parameters at their wall that are freed beside the effects that leave least
+_MOST_FAR = 2  # parameters at their wall that are freed with the effects that leave least
 _MOST_PAIRS = 2  # pairs of parameters that are fitted (decision 25)
 _PAIR_SHARE = 0.08  # share of the largest predicted gain from which a pair is fitted (decision 25)
 # wrong by one mistake: other valve and fittings, load, arm (decision 25)
@@ -137,7 +137,7 @@ def free_suspects(
     ]
     gains = _worth_a_fit(attempts, baseline, list(dict.fromkeys(suspects)), attempts.no_inflation)
     # the linear model says little of what is far away: each parameter is fitted, whatever its
-    # predicted gain beside others
+    # predicted gain with others
     least = _PAIR_SHARE * max(gains.values(), default=0.0)
     pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][
         :_MOST_PAIRS
