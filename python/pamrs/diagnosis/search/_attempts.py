@@ -12,6 +12,7 @@ import numpy as np
 
 from pamrs.channels import block_of, channel_of
 from pamrs.diagnosis.evidence import (
+    SAME_STDS,
     BlockLikelihood,
     FittedHypothesis,
     Likelihood,
@@ -22,6 +23,7 @@ from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
     LEAST_START,
+    LEAST_STEP_SHARE,
     Events,
     Fit,
     Inflation,
@@ -67,10 +69,6 @@ _SEALED_EVALUATIONS = 30  # evaluations of a fit for a rig without a valve, whic
 _POLISH_EVALUATIONS = 10  # evaluations of the last stretch of a fit (decision 22)
 # fits of a set weighted by what it leaves, while correlated variance falls (decision 103)
 _MOST_WEIGHTINGS = 4
-# deviations by which an effect's size may differ between recordings by its own uncertainty
-_SCATTER_STDS = 2.0
-# share of the nominal stable step below which no events are sought: too slow (decision 103)
-_LEAST_STEP_SHARE = 0.2
 _MOST_TURNS = 3  # in which events and the effects with them are fitted in turn
 _LEAST_TURN = 0.8  # share of the sum of squares above which a further turn is not worth it
 _EVALUATIONS_WITH_EVENTS = 6  # evaluations of the fit of persistent effects with events that stay
@@ -170,7 +168,7 @@ class Attempts:
             return None  # it would replace what it is to happen with
         if candidate.fit.events is not None or candidate.wrong:
             return None  # what happens with other events, or wrong values, is not fitted
-        stiffest = _LEAST_STEP_SHARE * self.fit_problem.core.stable_step
+        stiffest = LEAST_STEP_SHARE * self.fit_problem.core.stable_step
         if core_rig(candidate.fit.rig, self.fit_problem.core).stable_step < stiffest:
             return None  # it would take too long
         return self._attempt(
@@ -657,5 +655,5 @@ def _scatter(effects: tuple[Term, ...], problem: Problem, best: Fit) -> float:
             errors.append(1.0 / math.sqrt(den) / size)
     if len(steps) < 2:
         return 0.0
-    beyond = [max(0.0, abs(s) - _SCATTER_STDS * e) for s, e in zip(steps, errors, strict=True)]
+    beyond = [max(0.0, abs(s) - SAME_STDS * e) for s, e in zip(steps, errors, strict=True)]
     return float(max(beyond))

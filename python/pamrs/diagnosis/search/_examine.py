@@ -52,14 +52,12 @@ from pamrs.diagnosis.search._hypotheses import (
     weigh_to_the_end,
 )
 from pamrs.diagnosis.search._sets import Say, Search
-from pamrs.diagnosis.search._wrong_parameters import free_suspects
+from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, free_suspects
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
 _FROM_PROBABILITY = 0.3  # probability of unlisted from which a form is looked for (decision 4)
-# share of the mismatch that it may leave, held-out too: no form of anything carries less
-_MOST_SHARE_LEFT = 0.8
 
 
 def examine(
@@ -392,7 +390,7 @@ def _add_form(group: BlockGroup, refit: Refit, say: Say, tell: Say) -> BlockGrou
     except SimulationError:
         return group
     # what does not carry over to recordings that were held out is no form of anything
-    if share_left(assessed, start, suspects) > _MOST_SHARE_LEFT:
+    if share_left(assessed, start, suspects) > 1.0 - FURTHER_SHARE:
         return group
     return replace(group, closure=assessed)
 
