@@ -265,7 +265,7 @@ _BETWEEN_LEFT = 1.6
 _LEAST_ALIVE = 0.2
 # samples of a window in which noise is compared: its mean differs by a tenth by chance
 WINDOW_SAMPLES = 64
-LEAST_SAMPLES = 192  # samples that are shared at the least: three windows
+LEAST_SAMPLES = 3 * WINDOW_SAMPLES  # that are shared at the least
 _LAGS = 8  # shifts in time that are looked at
 # neighbours on either side by which a sample is predicted without the other recording
 _NEIGHBOURS = 4

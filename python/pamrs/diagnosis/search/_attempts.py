@@ -71,10 +71,10 @@ _POLISH_EVALUATIONS = 10  # evaluations of the last stretch of a fit (decision 2
 _MOST_WEIGHTINGS = 4
 _MOST_TURNS = 3  # in which events and the effects with them are fitted in turn
 _LEAST_TURN = 0.8  # share of the sum of squares above which a further turn is not worth it
-_EVALUATIONS_WITH_EVENTS = 6  # evaluations of the fit of persistent effects with events that stay
-_FIRST_EVALUATIONS = 5  # evaluations of such a fit (decision 13)
-# evaluations of a freed parameter's first fit: is it worth a whole one (decision 25)
-_WRONG_PARAMETERS_FIRST_EVALUATIONS = 6
+_FIRST_EVALUATIONS = 5  # evaluations of a first fit of a set (decision 13)
+# evaluations of a freed parameter's first fit: is it worth a whole one (decision 25); and of a
+# refit of persistent effects with events that stay
+_SHORT_EVALUATIONS = 6
 
 
 Found = TypeVar("Found")
@@ -244,7 +244,7 @@ class Attempts:
             inflation,
             warm,
             events=fitted.events,
-            evaluations=_EVALUATIONS_WITH_EVENTS,
+            evaluations=_SHORT_EVALUATIONS,
         )
         names = [n for n in fitted.values if effect_of(n) == effect]
         return replace(
@@ -415,7 +415,7 @@ class Attempts:
             self.no_inflation,
             freed=names,
             settled={n: known[n].value for n in others},
-            evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
+            evaluations=_SHORT_EVALUATIONS,
         )
 
     def fit_freed_shortly(self, names: tuple[str, ...]) -> FittedHypothesis | None:
@@ -432,7 +432,7 @@ class Attempts:
                 self.no_inflation,
                 warm=self._fit_alone(names),
                 freed=names,
-                evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
+                evaluations=_SHORT_EVALUATIONS,
             )
             return replace(self.assess((), short), wrong=names)
 

@@ -54,7 +54,6 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-_MOST_OWN_WEIGHTINGS = 8  # of a refit where recordings count by their own
 _DRAGGED = 25.0  # times as large a sum of squares of the others with one recording as without it
 # held-out variance over noise that is a mismatch the fitted hardly show (decision 20)
 _HELD_OUT_RATIO = 2.0
@@ -77,7 +76,7 @@ def with_inflation(
     if inflation.largest <= CORRELATED_VARIANCE:
         return first, inflation
     fitted = thorough(problem, nominal, inflation, first)
-    for _ in range(_MOST_OWN_WEIGHTINGS if inflation.apart else 0):
+    for _ in range(8 if inflation.apart else 0):  # until no weight falls by much
         # what is apart had moved the baseline, and that missed the others
         last, inflation = inflation, inflation_of(problem, fitted, noise_level)
         fitted = thorough(problem, nominal, inflation, fitted)
