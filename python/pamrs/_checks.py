@@ -124,7 +124,7 @@ def as_numbers(name: str, values: Any, most: int | None = None) -> NDArray[np.fl
     import numpy as np
 
     without_units(name, values)
-    size = getattr(values, "size", 0)  # an array that repeats one number is larger than it looks
+    size = getattr(values, "size", 0)  # an array that repeats one number is larger than it seems
     if most is not None and isinstance(size, int) and size > most:
         raise ParameterError(f"{name} has {size} numbers, which is not allowed: at most {most} are")
     try:

@@ -189,8 +189,8 @@ CHANNELS: Final[dict[str, Channel]] = {
         ),
     )
 }  # fmt: skip
-#: SI unit of each channel, recorded or simulated; pressures gauge, but for the ambient one. Behind
-#: the name of the block stands the number of a tube's segment: ``segment_flow.flexor.1``.
+#: SI unit of each channel, recorded or simulated; pressures gauge, but for the ambient one. After
+#: the name of the block comes the number of a tube's segment: ``segment_flow.flexor.1``.
 UNITS: Final[dict[str, str]] = {
     **{name: row.unit for name, row in CHANNELS.items()},
     "joint_rate": "rad/s",

@@ -154,7 +154,7 @@ _SYMBOLS: Final[dict[str, tuple[float, _Vector]]] = {
     "K": (1.0, _K),
 }
 
-# units with an offset stand alone, never inside a product
+# units with an offset are alone, never inside a product
 _OFFSETS: Final[dict[str, tuple[float, float]]] = {
     "degC": (1.0, 273.15),
     "°C": (1.0, 273.15),
@@ -163,7 +163,7 @@ _OFFSETS: Final[dict[str, tuple[float, float]]] = {
     "°F": (5.0 / 9.0, 273.15 - 32.0 * 5.0 / 9.0),
 }
 
-#: What stands behind a unit of pressure: measured from the ambient pressure, or from nothing.
+#: What comes after a unit of pressure: measured from the ambient pressure, or from nothing.
 _FROM_AMBIENT: Final = frozenset(("g", "gauge", "ü", "rel", "relative"))
 _FROM_NOTHING: Final = frozenset(("a", "abs", "absolute", "absolut"))
 _BEHIND: Final = "|".join(sorted(_FROM_AMBIENT | _FROM_NOTHING, key=len, reverse=True))

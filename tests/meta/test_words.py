@@ -1,9 +1,10 @@
-"""Words that nobody should have to learn: pages, messages, docstrings, names and words of effects
-are plain.
+"""Words that nobody should have to learn: pages, messages, docstrings, comments, names and words of
+effects are plain.
 """
 
 import ast
 import re
+import tokenize
 import tomllib
 from pathlib import Path
 
@@ -82,10 +83,9 @@ def messages(path):
             text = node.value if isinstance(node.value, str) else ""
         if len(text.split()) > 2:
             yield node.lineno, text
-    if "cli" in path.parts:
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef) and node.decorator_list:
-                yield node.lineno, ast.get_docstring(node) or ""
+    for node in ast.walk(tree) if "cli" in path.parts else ():
+        if isinstance(node, ast.FunctionDef) and node.decorator_list:
+            yield node.lineno, ast.get_docstring(node) or ""
 
 
 @pytest.mark.parametrize("name", list(pages()))
@@ -101,8 +101,9 @@ def test_messages_have_no_private_words():
         for line, text in messages(path)
     ]
     assert len(said) > 1500
-    found = {f"{name}:{line}": words for name, line, text in said if (words := private_words(text))}
-    assert not found
+    assert not {
+        f"{name}:{line}": words for name, line, text in said if (words := private_words(text))
+    }
 
 
 def docstrings():
@@ -113,8 +114,22 @@ def docstrings():
                 yield f"{path.relative_to(ROOT)}:{entry.lineno}", str(entry.value.value)
 
 
-def test_docstrings_have_no_private_words():
-    documented = dict(docstrings())
+def comments():
+    """Name of every module, and its comments as one text."""
+    for path in sorted((ROOT / "python/pamrs").rglob("*.py")):
+        lines = iter(path.read_text(encoding="utf-8").splitlines(keepends=True))
+        yield (
+            path.relative_to(ROOT).as_posix(),
+            " ".join(
+                token.string.lstrip("#: ")
+                for token in tokenize.generate_tokens(lines.__next__)
+                if token.type == tokenize.COMMENT
+            ),
+        )
+
+
+def test_docstrings_and_comments_have_no_private_words():
+    documented = dict([*docstrings(), *comments()])
     assert len(documented) > 3000
     assert not {name: words for name, text in documented.items() if (words := private_words(text))}
 
@@ -145,19 +160,15 @@ def test_words_of_effects_are_not_private():
     assert len(files) > 30
 
     def texts(entry):
-        if isinstance(entry, dict):
-            return [text for value in entry.values() for text in texts(value)]
-        if isinstance(entry, list):
-            return [text for value in entry for text in texts(value)]
-        return [str(entry)]
+        values = list(entry.values()) if isinstance(entry, dict) else entry
+        return sum(map(texts, values), []) if isinstance(values, list) else [str(entry)]
 
-    found = {
+    assert not {
         path.name: words
         for path in files
         for text in texts(tomllib.loads(path.read_text(encoding="utf-8")))
         if (words := private_words(text))
     }
-    assert not found
 
 
 @pytest.mark.parametrize(

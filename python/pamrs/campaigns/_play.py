@@ -21,7 +21,7 @@ from pamrs.errors import ParameterError
 from pamrs.findings import Protocol
 
 _LOST: Final = 0.1  # [s] without a usable reading after which a device is stopped
-_RISEN: Final = 5e4  # [Pa] by which a pressure may rise while its valve is told to vent
+_RISEN: Final = 5e4  # [Pa] by which a pressure may rise while its valve is to vent
 _EMPTY: Final = 2e3  # [Pa] below which a chamber begins empty, and its valve vents all the time
 _GAP: Final = 2e4  # [Pa] from which on a valve opens by a quarter before a run
 

@@ -115,5 +115,5 @@ class Recorder:
         """End the file."""
         try:
             self._file.close()
-        except OSError:  # what a full disk did not take was told when it was written
+        except OSError:  # what a full disk did not take was reported as it was written
             return

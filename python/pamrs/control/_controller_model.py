@@ -25,7 +25,7 @@ _WIDTHS: Final[dict[str, float]] = {
     "length": 1e-6,
     "length_rate": 1e-6,
 }
-#: What controllers of one valve are told.
+#: What controllers of one valve get.
 _OF_ONE: Final = ("joint_angle", "joint_rate", "muscle_pressure")
 #: By how much of the slope the slopes of both sides may differ.
 _KINK: Final = 0.01

@@ -187,7 +187,7 @@ class RigController(SampledController):
             )
         self._gain_batch = sizes.pop() if sizes else None
         self._number = {name: k for k, name in enumerate(model.joints)}
-        # a mass is followed by its length, and the law is told the shortening
+        # a mass is followed by its length, and the law gets the shortening
         self._rest_length = getattr(model.arm, "rest_length", None)
         #: Shortest and longest length that a hanging mass can have [m]; None for joints.
         self.lengths = lengths_of(model.rig)

@@ -22,7 +22,7 @@ LENGTHS: Final = ("upper_axial", "upper_offset", "lower_axial", "lower_offset")
 #: Their names in Table 3.5.
 SYMBOLS: Final = ("lu", "ru", "ll", "rl")
 
-#: Where the lengths are looked for unless told [m]; the dissertation prints no bounds.
+#: Where the lengths are looked for unless given [m]; the dissertation prints no bounds.
 DEFAULT_BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "upper_axial": (0.0127, 0.0635),
     "upper_offset": (0.0127, 0.0635),

@@ -35,6 +35,7 @@ from pamrs.diagnosis.model import Conclusion, conclude
 from pamrs.diagnosis.next_experiment import next_to_record
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
+    NOISE_STDS,
     Block,
     Prepared,
     Ready,
@@ -69,10 +70,6 @@ __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose", "missing_input"]
 
 # factor for effects on a joint whose geometry is marked unknown (decision 12)
 _UNKNOWN_GEOMETRY_PROBABILITY = 0.4
-# deviations by which noise may move a regulator's droop before its block is left out
-_REGULATOR_DROOP_SHIFT = 3.0
-# points of a missing input that a result keeps of each recording
-_MOST_POINTS = 400
 
 
 #: Shares of a diagnosis at which its blocks begin to be judged, and are.
@@ -139,11 +136,11 @@ def _regulators_in_noise(problem: Problem, rig: Rig) -> dict[str, str]:
         shift = math.sqrt(
             sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True))
         )
-        if shift > _REGULATOR_DROOP_SHIFT:
+        if shift > NOISE_STDS:
             reasons[block.name] = (
                 "only the difference of two measured pressures "
                 f"tells the regulator's flow, and their noise would move its droop by {shift:.2g} "
-                f"standard deviations; at most {_REGULATOR_DROOP_SHIFT:g} is allowed (a flow meter "
+                f"standard deviations; at most {NOISE_STDS:g} is allowed (a flow meter "
                 "would settle it)"
             )
     return reasons
@@ -439,7 +436,8 @@ def _missing(
         margin=fit_problem.settings.noise_margin,
     )
     followed = missing is not None and missing.share > 0.0 and missing.noises_after < MOST_MISSED
-    return missing.thinned(_MOST_POINTS) if missing is not None and followed else None
+    # by so many points of each recording, which is all that a result keeps
+    return missing.thinned(400) if missing is not None and followed else None
 
 
 def _limits(conclusion: Conclusion, fit_problem: Problem, held_out_problem: Problem) -> list[Limit]:

@@ -34,7 +34,7 @@ from pamrs.diagnosis.fit import (
     starts_of,
 )
 from pamrs.diagnosis.noise import NoiseLevel, bins_of
-from pamrs.diagnosis.prepare import Block, Prepared, binned
+from pamrs.diagnosis.prepare import ROUNDING, Block, Prepared, binned
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, Term
 from pamrs.errors import ParameterError, RigError, SimulationError
@@ -44,7 +44,6 @@ from pamrs.simulation import core_rig
 
 __all__ = ["Limits", "Products", "counted", "limits_of", "possible_starts", "products_of"]
 
-_NOTHING = 1e-6  # [noise levels] signature below which rounding is all there is
 _MOST_MULTIPLE = 1e4  # [typical sizes] largest size of an effect that is worth telling
 # halvings of a size until a rig can have it: below a hundredth it is another effect
 _MOST_HALVINGS = 8
@@ -175,7 +174,7 @@ def _copies(products: Array, curves: int, count: int) -> Array:
     the curves of its error; infinite where an effect does not show.
     """
     power = np.diag(products)[products.shape[0] - count :]
-    acting = power > _NOTHING**2
+    acting = power > ROUNDING**2
     error = float(np.trace(products[:curves, :curves])) / max(1, int(acting.sum()))
     return np.where(acting, np.sqrt(error / np.where(acting, power, 1.0)), math.inf)
 
@@ -259,15 +258,15 @@ class Limits:
 
     def _taken(self, name: str, rivals: Mask) -> Array:
         """Part of an effect's squared signature that each rival column takes at its best size."""
-        showing = rivals & (self._power > _NOTHING**2)
+        showing = rivals & (self._power > ROUNDING**2)
         shared = self._free[self._best[name]] ** 2
-        return np.where(showing, shared, 0.0) / np.maximum(self._power, _NOTHING**2)
+        return np.where(showing, shared, 0.0) / np.maximum(self._power, ROUNDING**2)
 
     def _limit(self, start: Start, shown: float, where: tuple[str, str]) -> Limit:
         """Limit of an effect by the one of its starts that shows most."""
         name = str(start.effect)
         power = float(self._power[self._best[name]])
-        if shown < _NOTHING or power <= 0.0:
+        if shown < ROUNDING or power <= 0.0:
             return Limit(name)
         taken = self._taken(name, self._labels != name)
         rival = int(np.argmax(taken))

@@ -25,7 +25,7 @@ from pamrs.rig.schema import BLOCKS, qualified
 from pamrs.simulation import Simulation, Simulator, has_frame, simulate, supplies_of
 
 BANDWIDTH = 15.0  # [rad/s] bandwidth of the pressure loop by which commands are found on the model
-# [s] rise of several chains' pressures to find where joints move: slow beside lags
+# [s] rise of several chains' pressures to find where joints move: slow next to lags
 _RAMP_TIME = 15.0
 
 

@@ -432,7 +432,7 @@ class Maker:
         (fed,) = {self.rig.ports("valve")[name]["from"] for name in chain.valves}
         kind, _, place = fed.partition(".")
         if kind != "supply":
-            return None  # what stands in front of the valve would have to be let down as well
+            return None  # what is in front of the valve would have to be let down as well
         middle = span.at(0.5) + ambient
         # x = psi(x) of ISO 6358: 0.76 to 0.81
         supply = max(middle / 0.8 - ambient, 1.15 * span.at(0.8))

@@ -167,7 +167,7 @@ _TOP: Final = {
     **dict.fromkeys(("clipped_force", "level_tolerance", "noise", "muscle"), Rule(None, "")),
 }
 
-#: Moduli of a muscle whose moduli a fit is to find, in the order that it takes unless told
+#: Moduli of a muscle whose moduli a fit is to find, in the order that it takes unless said
 #: otherwise.
 NO_MODULI: Final = (0.0, 0.0, 0.0, 0.0)
 _ZEROS: Final[dict[str, Any]] = {

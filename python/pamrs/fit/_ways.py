@@ -12,7 +12,7 @@ from pamrs._arrays import Array, Index
 
 _HELD: Final = 0.005  # of the rest length: within it a length is held, a frame that yields included
 _CYCLED: Final = 0.1  # of the largest pressure: what the pressure does while a length is held
-_MOST: Final = 0.8  # of the rows stand at held lengths where the map is isometric
+_MOST: Final = 0.8  # of the rows are at held lengths where the map is isometric
 _STROKE: Final = 4  # rows of a stroke at least, on average
 _FEWEST: Final = 8  # rows at one held length: two branches of four
 

@@ -177,11 +177,11 @@ Place = int | np.signedinteger
 
 GAP: Final = 1.6  # intervals longer than this many samples are holes
 _JUMP_HOLE: Final = 10  # samples left empty where the clock jumped: the true pause is unknown
-_ON_SAMPLE: Final = 0.05  # samples: nearer than this, a recorded value stands as it is
+_ON_SAMPLE: Final = 0.05  # samples: nearer than this, a recorded value stays as it is
 _MOST_EVENTS: Final = 20
 _LATE_SAMPLES: Final = 2  # samples: a hole of so many is the timer's jitter where there are several
 _FARTHEST: Final = 1e12  # samples that a hole is said to have, at most
-_FEW_LATE: Final = 2  # such holes that are told one by one
+_FEW_LATE: Final = 2  # such holes that are named one by one
 
 
 class Event(NamedTuple):

@@ -26,13 +26,13 @@ _UNITS: Final = ("bar", "psi", "kPa", "MPa", "mbar", "Pa")
 _TOP: Final = 0.995  # quantile that stands for the largest value, spikes left out
 _LOW: Final = 0.005
 _HIGHEST: Final = 25e5  # no pneumatic muscle or its supply goes higher, without a rig to ask [Pa]
-_RATED: Final = (0.6, 1.5)  # a tank beside what the rig file says of it
+_RATED: Final = (0.6, 1.5)  # a tank next to what the rig file says of it
 _LEAST: Final = 0.02  # of the supply, which a muscle is filled to at the least
-_OVER: Final = 1.15  # a muscle beside what feeds it
+_OVER: Final = 1.15  # a muscle next to what feeds it
 _CONNECTED: Final = 0.2  # of what the rig file says, from which a supply's gauge is believed
 _REST: Final = 0.02  # share of the samples that rest at the lowest level
 _STAYS: Final = 0.8  # of the samples near it that are there: a curve that passes has fewer
-_NEAR: Final = 0.06  # of the ambient pressure, beside which a level counts as ambient
+_NEAR: Final = 0.06  # of the ambient pressure, around which a level counts as ambient
 _AMBIENT_OFF: Final = 0.02  # of the stated ambient pressure; a gauge and weather do less
 _VOLTS: Final = 30.0  # no valve is commanded with more
 _TURNS: Final = (-2.0 * np.pi, 2.0 * np.pi)  # [rad] no joint goes farther
@@ -409,7 +409,7 @@ def assumed_unit(name: str, values: Array, rig: Rig | None, stated: str) -> tupl
         first, last, slack = _room(name, rig)
         ends = {u: (low * parse_unit(u).scale, high * parse_unit(u).scale) for u in units}
         fit = [u for u, (a, b) in ends.items() if first - slack <= a and b <= last + slack]
-        if len(fit) > 1:  # a stand hardly stays within so little of what it can do
+        if len(fit) > 1:  # a rig hardly stays within so little of what it can do
             fit = [u for u in fit if ends[u][1] - ends[u][0] >= _STILL * (last - first)]
         where = "the rig file allows it" if slack else "it can be"
         if len(fit) != 1:

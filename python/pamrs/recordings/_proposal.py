@@ -52,7 +52,7 @@ from pamrs.units import parse_unit, same_dimension
 #: What says that a series was commanded, and what, that it was measured.
 _COMMANDED: Final = frozenset(COMMANDED.split())
 _MEASURED: Final = frozenset(MEASURED.split())
-#: Channels that a diagnosis sets the rig by, or that stand in a gas: no weak word, and no unit,
+#: Channels that a diagnosis sets the rig by, or that are in a gas: no weak word, and no unit,
 #: names them alone.
 _ONLY_NAMED: Final = frozenset(with_trait("named"))
 #: Pressures that a rig can do without: "pressure" alone is none of them.

@@ -196,7 +196,7 @@ CLOCK: Final[dict[str, Rule]] = {
     "unit": Rule(is_name, "a text", "of these times"),
     "offset": Rule(is_finite, "a number of seconds", "added to the times [s]"),
 }
-#: The table of a channel that stands in the log; ``unit`` is that of the channel.
+#: The table of a channel that is in the log; ``unit`` is that of the channel.
 CHANNEL: Final[dict[str, Rule]] = {
     "column": Rule(is_name, "a text", "its series in the log"),
     "less": Rule(is_name, "a text", "a second series, taken off it before what follows"),

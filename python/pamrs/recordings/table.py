@@ -29,7 +29,7 @@ from pamrs.recordings._gate import check_size
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
 #: Endings of files that are read as text; each may be packed (``.gz``).
 TEXT: Final = (".csv", ".tsv", ".txt", ".dat", "")
-_PART: Final = "\x1f"  # stands between cells that were quoted, or are no text of a file
+_PART: Final = "\x1f"  # is between cells that were quoted, or are no text of a file
 _BLOCK: Final = 2000  # rows that are parsed together
 _CUT: Final = 20  # one row in so many may be cut short
 
@@ -627,7 +627,7 @@ def thousands_of(thousands: str | Mapping[str, str] | None, name: str) -> str | 
 
 _PAIRS: Final = tuple((mark, decimal) for mark in ("\t", ";", ",", "|", " ") for decimal in ".,")
 _LINES: Final = 400  # in which the dialect is looked for
-#: Numbers beside others whose decimal mark is the comma: points part thousands.
+#: Numbers next to others whose decimal mark is the comma: points part thousands.
 GROUPED_BY_POINTS: Final = re.compile(r"[-+]?(?:[1-9]\d{0,2}(?:\.\d{3})+|\d{1,3})(?:,\d+)?")
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 _POINT = re.compile(r"[+-]?(\d+\.\d*|\.\d+)([eE][+-]?\d+)?")

@@ -29,7 +29,7 @@ from pamrs.report.page import render_page
 
 TRACES = 3
 """Channels of a recording that are drawn."""
-_LEAST_CONDITION = 0.005  # share of the excess below which a condition is not told: 0 %
+_LEAST_CONDITION = 0.005  # share of the excess below which a condition is not named: 0 %
 THROUGHOUT = 0.9
 """Share of a recording from which an excess is throughout it."""
 _BADGES = {

@@ -130,7 +130,7 @@ def _draw_channel(
             time,
             factor * value,
             color=COLOURS["measured"],
-            lw=2.6,  # seen beside a thin line that follows it
+            lw=2.6,  # seen with a thin line that follows it
             alpha=0.6,
             label="_" if "recorded" in drawn else "recorded",
         )

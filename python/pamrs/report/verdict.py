@@ -31,7 +31,7 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
 _MENDED = 0.98  # share of a channel's error from which a wrong value is not said to mend it
-_MOST_MOVED = 3  # values of the rig file that are told as moved
+_MOST_MOVED = 3  # values of the rig file that are named as moved
 
 
 def unknown_volumes(rig: Rig) -> list[str]:

@@ -105,7 +105,7 @@ class Reader:
         self.units = Units()
         self.ports: dict[str, dict[str, str]] = {}
         self.own: list[str] = []
-        self.whole = True  # every block could be told: what is connected to what can be checked
+        self.whole = True  # every block was understood: what is connected to what can be checked
 
     def refuse(self, name: str, value: object, needed: str) -> None:
         """Note a value that is not allowed, and what is needed."""

@@ -229,7 +229,7 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
 
 
 def _line(name: str, table: Mapping[str, Any], ports: Ports) -> dict[str, Any]:
-    usual = () if table.get("segments") else ("segments",)  # none: the core need not be told
+    usual = () if table.get("segments") else ("segments",)  # none: the core needs no word of it
     values = {k: value for k, value in _gauged(table).items() if k not in ("kind", *usual)}
     ends = ports["line"][name]
     return {"name": name, "kind": table["kind"], "from": ends["from"], "to": ends["to"], **values}

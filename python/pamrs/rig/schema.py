@@ -38,7 +38,7 @@ __all__ = [
 
 SCHEMA: Final = "pamrs.rig/1"
 REQUIRED_BLOCKS: Final = ("gas", "chamber")
-#: Blocks that stand once and have no name; every other one may stand several times, then each with
+#: Blocks that come once and have no name; every other one may come several times, then each with
 #: a name.
 SINGLE_BLOCKS: Final = ("gas", "arm", "load")
 
@@ -119,7 +119,7 @@ class Port(NamedTuple):
 STOPS: Final = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
 SPRING: Final = ("stiffness", "spring_angle")
 
-#: Tables inside a block: name -> the keys that stand in it, there without the name of the table.
+#: Tables inside a block: name -> the keys that are in it, there without the name of the table.
 _INNER: Final[dict[str, dict[str, tuple[str, ...]]]] = {
     "valve": {"area_fraction": ("opening", "fraction")},
     "muscle": {

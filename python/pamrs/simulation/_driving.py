@@ -22,7 +22,7 @@ Signals = ArrayLike | Mapping[str, ArrayLike]
 
 #: What a rig can be driven by, in the order in which it is recorded.
 SIGNALS = ("valve_command", "supply_command", "length", "pressure", "supply_pressure")
-#: State that an initial value can be given for, and the block whose name stands behind it.
+#: State that an initial value can be given for, and the block whose name comes after it.
 _INITIAL = {
     "muscle_pressure": "chamber",
     "supply_pressure": "supply",

@@ -22,7 +22,7 @@ FILES: Final = ("report.html", "result.json", "model.toml", "experiment.csv")
 _MADE: Final = ".result-"  # where they are made, and then moved from
 _LINES: Final = 200  # of the progress that are kept
 _SCREENED: Final = ": screened: "  # of the line that ranks hypotheses, the first first
-_MOST: Final = 3  # of them that are told
+_MOST: Final = 3  # of them that are shown
 _PATIENCE: Final = 5.0  # s that an ended process gets to be gone
 
 

@@ -72,7 +72,7 @@ class SweepPlan:
         }
         text = json.dumps(described, sort_keys=True)
         digest = hashlib.sha256(text.encode()).hexdigest()
-        # the rig itself is there so that people are told how another one differs
+        # the rig itself is there so that people are shown how another one differs
         return {"digest": digest, "entries": described, "rig": self.rig}
 
 

@@ -219,7 +219,7 @@ class Store:
                 dimension_names=axes.dims,
                 attributes={"units": unit} | ({} if name in axes.names else coordinates),
             )
-        with warnings.catch_warnings():  # it stands in the format's own file since version 3
+        with warnings.catch_warnings():  # it is in the format's own file since version 3
             warnings.simplefilter("ignore")
             zarr.consolidate_metadata(str(new))
 

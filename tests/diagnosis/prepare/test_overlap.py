@@ -15,7 +15,7 @@ from scipy.signal import decimate
 
 import pamrs
 from pamrs.diagnosis.prepare import overlap, without_copies
-from pamrs.diagnosis.prepare._copies import _GAP, WINDOW_SAMPLES
+from pamrs.diagnosis.prepare._copies import ARM_WINDOW, WINDOW_SAMPLES
 from pamrs.recordings import Recording
 from tests.diagnosis.held import RIG as CHAMBER
 from tests.diagnosis.held import hold
@@ -200,8 +200,8 @@ def test_what_a_held_out_window_does_not_share_is_kept(kind: str, bits: float, c
     assert [r.name for r in kept] == [one.name, "proof"]
     # the first 8 s of it are shared; a gap, and a window in which that is told, are left out too
     begin = proof.duration - kept[1].duration
-    margin = _GAP + WINDOW_SAMPLES * proof.sample_time
-    assert 8.0 + _GAP <= begin <= 8.0 + margin + 0.5
+    margin = ARM_WINDOW + WINDOW_SAMPLES * proof.sample_time
+    assert 8.0 + ARM_WINDOW <= begin <= 8.0 + margin + 0.5
     step = round(begin / proof.sample_time)
     for name, values in kept[1].channels.items():
         np.testing.assert_array_equal(values, proof.channels[name][step:])
@@ -216,10 +216,10 @@ def test_a_copy_inside_other_data_leaves_both_sides() -> None:
     proof = joined("proof", before, one.between(4.0, 12.0), after)
     kept, said = without_copies([one, proof])
     first, second = (r for r in kept if r.role == "held_out")
-    assert first.duration == pytest.approx(15.0 - _GAP, abs=0.7)
-    assert second.duration == pytest.approx(20.0 - _GAP, abs=0.7)
-    assert first.duration < 15.0 - _GAP
-    assert second.duration < 20.0 - _GAP
+    assert first.duration == pytest.approx(15.0 - ARM_WINDOW, abs=0.7)
+    assert second.duration == pytest.approx(20.0 - ARM_WINDOW, abs=0.7)
+    assert first.duration < 15.0 - ARM_WINDOW
+    assert second.duration < 20.0 - ARM_WINDOW
     assert first.name.startswith("proof, 0 to 1")
     assert second.name.endswith(f"{proof.duration:.4g} s")
     assert " and " in said[0]
@@ -231,7 +231,7 @@ def test_two_copies_at_different_times_are_both_cut_out() -> None:
     proof = joined("proof", two.between(3.0, 13.0), new, one.between(6.0, 16.0))
     kept, _ = without_copies([one, two, proof])
     (left,) = (r for r in kept if r.role == "held_out")
-    assert left.duration == pytest.approx(24.0 - 2 * _GAP, abs=1.4)
+    assert left.duration == pytest.approx(24.0 - 2 * ARM_WINDOW, abs=1.4)
     assert all(overlap(left, fitted) is None for fitted in (one, two))
     at = proof.channels["muscle_pressure"].tolist().index(left.channels["muscle_pressure"][0])
     assert 2000 < at < 2000 + 4800

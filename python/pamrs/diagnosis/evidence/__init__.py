@@ -22,6 +22,7 @@ from pamrs.diagnosis.evidence._candidates import (
     significant,
 )
 from pamrs.diagnosis.evidence._determined import (
+    SAME_STDS,
     is_absent,
     same_recordings,
     value_may_be_inside,
@@ -55,6 +56,7 @@ from pamrs.diagnosis.evidence._verdicts import (
 )
 
 __all__ = [
+    "SAME_STDS",
     "SHARED_ODDS",
     "WALL_TOLERANCES",
     "FORM_SHARE_ALIKE",

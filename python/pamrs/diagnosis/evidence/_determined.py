@@ -13,7 +13,7 @@ from pamrs.diagnosis.fit import Fit, Problem, form_in, moved_value, same_data_in
 from pamrs.effects import Term, effect_of
 
 _SAME_SHARE = 0.1  # part of an effect's size below which what tells it from another effect is zero
-# [standard deviations] standard deviations within which a value is not told from zero
+# standard deviations within which a value, or a difference, is not told from zero
 SAME_STDS = 2.0
 # stated deviations within which a size, or that a value is wrong, is not determined; a stated one
 # is twice the pieces'

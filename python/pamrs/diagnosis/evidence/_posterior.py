@@ -31,7 +31,8 @@ from pamrs.diagnosis.evidence._prior import (
     shares_of_undecided,
 )
 from pamrs.diagnosis.fit import Problem
-from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.noise import SIZE_SPREAD
+from pamrs.diagnosis.prepare import NOISE_STDS, Block
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import UNDECIDED, UNLISTED, WITHOUT_NAME, Hypothesis, Term, effect_of
 
@@ -41,14 +42,12 @@ from pamrs.effects import UNDECIDED, UNLISTED, WITHOUT_NAME, Hypothesis, Term, e
 LEAST_TEMPERING, _MOST_TEMPERING, _NOISE_TEMPERING = 0.01, 0.1, 0.3
 # share of what it explains that a right name leaves, as forms of equations err (decision 14)
 _FORM_ERROR = 0.1
-_FORM_SPREAD = math.log(3.0)  # spread of the logarithm of that share: a factor (decision 14)
-# [noise levels of bin means] error beside whatever is explained: these levels err (decision 14)
+# [noise levels of bin means] error whatever is explained: these levels err (decision 14)
 _LEAST_ERROR = 0.1
 _STRAIN_SHARE = 0.5  # share of the priors' sum of squares that counts (decision 14)
-_ALIKE_STDS = 3.0  # [standard deviations] by which the values of one name in two groups may differ
 # share of the larger by which values differ however well known, as models err: a factor of two
 _ALIKE_SHARE = 0.5
-_COUNTED = 1e-6  # probability from which a hypothesis of one group is put beside those of others
+_COUNTED = 1e-6  # probability from which a hypothesis of one group is put with those of others
 
 
 def posterior(
@@ -120,9 +119,9 @@ def _odds_of_form(taken: float) -> float:
     leaves an amplitude as forms of right names that err do (log-normal), of which the best name for
     other physics leaves any share, each as probable.
     """
-    left = max(math.sqrt(1.0 - taken), _FORM_ERROR * math.exp(-(_FORM_SPREAD**2)))
-    far = math.log(left / _FORM_ERROR) / _FORM_SPREAD
-    density = math.exp(-0.5 * far**2) / (math.sqrt(2.0 * math.pi) * _FORM_SPREAD * left)
+    left = max(math.sqrt(1.0 - taken), _FORM_ERROR * math.exp(-(SIZE_SPREAD**2)))
+    far = math.log(left / _FORM_ERROR) / SIZE_SPREAD
+    density = math.exp(-0.5 * far**2) / (math.sqrt(2.0 * math.pi) * SIZE_SPREAD * left)
     return taken * max(1.0, density)
 
 
@@ -166,7 +165,7 @@ def _evidence(
         now, before = candidate.likelihood()[name], baseline.likelihood()[name]
         taken = max(0.0, before.size**2 - now.size**2)
         expected = _LEAST_ERROR + _FORM_ERROR * math.sqrt(taken)
-        beyond = np.log(np.maximum(now.sizes, expected) / expected) / _FORM_SPREAD
+        beyond = np.log(np.maximum(now.sizes, expected) / expected) / SIZE_SPREAD
         # windows that are too short for a hypothesis leave it fewer bins
         tempered = tempering * before.count / max(1, now.count) * now.by_size
         total += float((tempered - 0.5 * beyond**2).max())
@@ -372,7 +371,7 @@ def _same_values(term: Term, candidates: Sequence[FittedHypothesis]) -> bool:
 
 def are_alike(first: float, second: float, std: float) -> bool:
     """True where two values differ by at most three standard deviations, or half of the larger."""
-    known = _ALIKE_STDS * std, _ALIKE_SHARE * max(abs(first), abs(second))
+    known = NOISE_STDS * std, _ALIKE_SHARE * max(abs(first), abs(second))
     return abs(first - second) <= max(known)
 
 

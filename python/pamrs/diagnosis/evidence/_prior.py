@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from pamrs.diagnosis.evidence._candidates import FittedHypothesis
 from pamrs.diagnosis.evidence._determined import SAME_STDS
 from pamrs.diagnosis.fit import Fit, Problem, form_in
+from pamrs.diagnosis.noise import SIZE_SPREAD
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
@@ -36,22 +37,18 @@ _STANDING_PRICE = 2.0
 _UNSEEN_LENGTHS = 3.0
 # [log odds] price of an effect with such a time constant, or with one that is not told from zero
 _UNSEEN_PRICE = 6.5
-# factor by which a value is one standard deviation outside its usual range (decision 22)
-_RANGE_FACTOR = 3.0
 # [log odds] the most that a value outside its usual range costs (decision 22)
 _MOST_RANGE_PRICE = 4.0
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
 SHARED_ODDS = 6.0
-# `UNDECIDED` of a group of which only noise is left is divided by these numbers (decision 4):
-# most of it goes to parameters where these moved, else to none
-_NOISE_ONLY_LIKELY = 0.83
-# of none where parameters moved, of parameters where they did not
+# `UNDECIDED` of a group of which only noise is left is divided by these numbers (decision 4), the
+# rest to parameters where these moved, else to none: of none where parameters moved, of parameters
+# where they did not
 _NOISE_ONLY_OTHER = 0.03
 # of unlisted: in 24 of 171 such groups physics was missing that was too small to be seen
 _NOISE_ONLY_UNLISTED = 0.14
 # of parameters where their values are unlikely: these explain all, at a price the owner would mind
 _UNLIKELY_PARAMETERS = 0.75
-_UNLIKELY_UNLISTED = 0.25  # of unlisted there
 # [tolerances] moved to its wall (fit.most_tolerances), which is suspect (decision 25)
 WALL_TOLERANCES = 2.9
 # [noise levels] left in a group below which nothing has no name: both such groups of 40 read cases
@@ -128,14 +125,10 @@ def shares_of_undecided(*, unlikely: bool, nominal_misses: bool) -> Mapping[Hypo
     whether the values of the baseline are unlikely, and whether the nominal model misses.
     """
     if unlikely:
-        return {PARAMETERS: _UNLIKELY_PARAMETERS, UNLISTED: _UNLIKELY_UNLISTED}
-    if nominal_misses:
-        return {
-            PARAMETERS: _NOISE_ONLY_LIKELY,
-            NONE: _NOISE_ONLY_OTHER,
-            UNLISTED: _NOISE_ONLY_UNLISTED,
-        }
-    return {PARAMETERS: _NOISE_ONLY_OTHER, NONE: _NOISE_ONLY_LIKELY, UNLISTED: _NOISE_ONLY_UNLISTED}
+        return {PARAMETERS: _UNLIKELY_PARAMETERS, UNLISTED: 1.0 - _UNLIKELY_PARAMETERS}
+    most = 1.0 - _NOISE_ONLY_OTHER - _NOISE_ONLY_UNLISTED
+    moved, none = (most, _NOISE_ONLY_OTHER) if nominal_misses else (_NOISE_ONLY_OTHER, most)
+    return {PARAMETERS: moved, NONE: none, UNLISTED: _NOISE_ONLY_UNLISTED}
 
 
 def probability_cap(fitted: Problem, mismatch: Block, rms_left: float, *, alone: bool) -> float:
@@ -172,7 +165,7 @@ def loss_by_value(candidate: FittedHypothesis, name: str) -> float:
         # what is large and hardly determined may be a part of its value, not nothing
         least = value * math.exp(-wide / value) if value > 0.0 else 0.0
         times = max(low / max(value + wide, 1e-300), least / high, 1.0)
-        outside = math.log(times) / math.log(_RANGE_FACTOR)
+        outside = math.log(times) / SIZE_SPREAD
         lost += min(0.5 * outside**2, _MOST_RANGE_PRICE)
     return lost
 

@@ -172,7 +172,7 @@ def case_ambiguity(judged: Sequence[Judged]) -> list[Hypothesis]:
     answers: list[Hypothesis] = []
     for choice in itertools.product(*options):
         terms, rest = tuple(terms_of(choice)), _rest(choice)
-        # of what has no name, only that something is missing counts beside a name
+        # of what has no name, only that something is missing counts next to a name
         entry = Hypothesis(terms, rest if not terms or rest == UNLISTED.rest else "")
         if entry.words and entry not in answers:
             answers.append(entry)

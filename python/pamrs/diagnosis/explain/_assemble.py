@@ -11,6 +11,7 @@ import numpy as np
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
+    SAME_STDS,
     BlockGroup,
     FittedHypothesis,
     Judged,
@@ -66,8 +67,6 @@ from pamrs.rig import Rig
 
 # [noise levels] gap of refit to noise below which nothing is said of how much closes
 _LEAST_GAP = 0.05
-# [standard deviations] moved, from which a parameter counts as determined too
-_DETERMINED_MOVE = 2.0
 
 
 def assemble(
@@ -430,10 +429,6 @@ def _effect_parameters(
     return out
 
 
-_REFERENCE_DENSITY = 1.185
-"""Density of air in the reference state of ISO 6358 [kg/m3], to which conductances refer."""
-
-
 def _emptying(effect: Term, candidate: FittedHypothesis) -> dict[str, EffectParameterFound]:
     """Time constant [s] of a sealed chamber emptying by a conductance; conductance per volume."""
     gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
@@ -444,8 +439,9 @@ def _emptying(effect: Term, candidate: FittedHypothesis) -> dict[str, EffectPara
             continue
         value, std = candidate.fit.values[name], candidate.fit.std[name]
         volume = chamber["dead_volume"]
+        density = 1.185  # [kg/m3] of air in the reference state of ISO 6358
         rt = gas["gas_constant"] * gas["temperature"]
-        tau = volume / (value * _REFERENCE_DENSITY * rt * chamber.get("alpha_out", 1.0))
+        tau = volume / (value * density * rt * chamber.get("alpha_out", 1.0))
         out["time_constant"] = _entry(tau, tau * std / value, "s", std < value)
         out["conductance_per_volume"] = _entry(
             value / volume, std / volume, "1/(s Pa)", std < value
@@ -484,7 +480,7 @@ def _parameters(
             std=fitted.std[name],
             unit=p.unit,
             moved_sigmas=in_tolerances(p, fitted.values[name]),
-            identifiable=fitted.std[name] < max(DETERMINED_SHARE * p.tol, moved / _DETERMINED_MOVE),
+            identifiable=fitted.std[name] < max(DETERMINED_SHARE * p.tol, moved / SAME_STDS),
         )
     return out
 

@@ -194,7 +194,7 @@ def _stage_with_excess(
     errors: Mapping[str, Mapping[str, ChannelError]],
 ) -> tuple[str, Problem, dict[Key, Residual], str] | None:
     """Stage, recordings, residuals and role that show what a block keeps; None if only noise."""
-    # a form without a name takes up what no name explains, and is no explanation
+    # a form without a name absorbs what no name explains, and is no explanation
     stage = "refit" if verdict == "unlisted" else "after"
     parts = {"held_out": mismatch, "fit": replace(mismatch, held_out=None)}
     if mismatch.held_out is None:
@@ -216,7 +216,7 @@ def _share_unexplained(
     share = sum(t.share for t in rest)
     if len(rest) == 1:
         return share, rest[0].interval
-    # only parameters stand before a form without a name, and the shares of every draw add up to 1
+    # only parameters come before a form without a name, and the shares of every draw add up to 1
     low, high = of_block[0].interval
     return share, [1.0 - high, 1.0 - low]
 

@@ -118,7 +118,7 @@ def _taken(fitted: Fit, baseline: Fit, problem: Problem, block: Block) -> float:
 
 
 _SPOKEN_SHARE = 0.05  # share of the form from which a kind of dependence is put into words
-_UNITS = {  # factors and units in which sizes are told
+_UNITS = {  # factors and units in which sizes are given
     "N m": ((1.0, "N m"),),
     "kg/s": ((1.0, "kg/s"), (1e-3, "g/s"), (1e-6, "mg/s"), (1e-9, "ug/s")),
 }

@@ -12,6 +12,7 @@ from pamrs.diagnosis.explain._conditions import Picture
 from pamrs.diagnosis.fit import Problem, concerns
 from pamrs.diagnosis.model import spoiled_channels
 from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.search import FAR_TOLERANCES
 from pamrs.effects import CATALOGUE, UNDECIDED, UNLISTED
 from pamrs.findings import Answer, ChannelError, ParameterFound, Where
 from pamrs.recordings import Case
@@ -27,7 +28,6 @@ from pamrs.report.verdict import unknown_volumes
 from pamrs.rig.schema import split_name
 from pamrs.units import in_words
 
-_MOVED_TOLERANCES = 2.0  # [tolerances] movement of a parameter beside an effect from which it is
 # relative scatter of an effect's size between recordings from which it is reported
 _SCATTER = 0.35
 # share of the ambient pressure within which a recording that begins at it may be absolute
@@ -36,7 +36,7 @@ _AMBIENT_SHARE = 0.01
 _DOUBTED_PRESSURE = 1e4
 # probability of no mismatch from which the text says that there may be none
 _NO_MISMATCH_PROBABILITY = 0.1
-# share of the excess over share of the time from which a condition is told
+# share of the excess over share of the time from which a condition is named
 TELLING_CONDITION = 1.15
 
 
@@ -241,9 +241,7 @@ def worse(table: dict[str, ChannelError]) -> list[str]:
 def reservations(chosen: list[FittedHypothesis]) -> list[str]:
     """Warnings of parameters that a fit with a named effect moved far."""
     named = [c for c in chosen if any(effect.id in CATALOGUE for effect in c.effects)]
-    moved = {
-        n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > _MOVED_TOLERANCES
-    }
+    moved = {n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > FAR_TOLERANCES}
     return [
         f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may compensate for the "
         "effect's form"

@@ -29,6 +29,7 @@ from pamrs.diagnosis.fit._effect_places import (
 from pamrs.diagnosis.fit._fitting import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
+    LEAST_STEP_SHARE,
     Events,
     Fit,
     Inflation,
@@ -73,6 +74,7 @@ from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_even
 
 __all__ = [
     "FINAL_STEP_SHARE",
+    "LEAST_STEP_SHARE",
     "FIT_BIN_TIME",
     "PIECE_TIME",
     "CHOSEN",

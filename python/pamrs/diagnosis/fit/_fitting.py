@@ -41,11 +41,9 @@ _LEAST_SCALE = 0.01
 LEAST_START = 1e-3  # share of a typical size from which a parameter goes on that a fit left at zero
 # [s] stable integration step below which a model is not tried: it would take too long
 _LEAST_STEP = 4e-4
-_LEAST_STEP_SHARE = 0.2  # the same of a stiff rig, as a share of the step of its nominal model
-# [tolerances] shift of a parameter to whose value the core has no sensitivities
-_SHIFT_TOLERANCES = 0.01
-_UNKNOWN_SHARE = 1e-5  # the same of one without a tolerance, as a share of its value
-# the same in a fit to its end: one that stopped early looked like physics (decision 22)
+LEAST_STEP_SHARE = 0.2  # the same of a stiff rig, as a share of the step of its nominal model
+# share of the sum of squares that a step of a fit to its end gains: one that stopped early looked
+# like physics (decision 22)
 FINAL_STEP_SHARE = 1e-5
 _LAST_STEPS = 2  # of which one left the range, where a fit was stopped there: it creeps on
 FIT_BIN_TIME = 0.02  # [s] bins of residuals for fits: faster than any effect of the catalogue shows
@@ -318,10 +316,10 @@ def _steps(rig: Rig, cores: Mapping[str, _core.Rig], names: Sequence[str]) -> di
 
 
 def _shift(known: Parameter) -> float:
-    """Finite-difference step of a parameter."""
+    """Finite-difference step of a parameter to whose value the core has no sensitivities."""
     if math.isfinite(known.tol):
-        return _SHIFT_TOLERANCES * known.tol
-    return _UNKNOWN_SHARE * abs(known.value) if known.value else _UNKNOWN_SHARE
+        return 0.01 * known.tol
+    return 1e-5 * (abs(known.value) or 1.0)
 
 
 def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:
@@ -371,7 +369,7 @@ def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
     """Compile another model; SimulationError where it is too stiff for any fit to afford."""
     with _inside_range():
         core = core_rig(rig, problem.core)
-    least = min(_LEAST_STEP, _LEAST_STEP_SHARE * problem.core.stable_step)
+    least = min(_LEAST_STEP, LEAST_STEP_SHARE * problem.core.stable_step)
     if core.stable_step < least:
         raise SimulationError(
             f"the model needs steps of {core.stable_step:.1e} s; to be fitted it may need "

@@ -22,9 +22,7 @@ _STEP_GAIN = 0.2
 _STEP_SHARE = 2e-3  # the same in a first fit, as a share of the sum of squares (decision 14)
 # evaluations that gain less than a step: as many as damping takes (decision 57)
 _STALL_EVALUATIONS = 5
-_FIRST_DAMPING = 1e-4  # damping with which Levenberg and Marquardt begin (Marquardt (1963))
 _MOST_DAMPING = 1e8  # damping at which they give up
-_MOST_SQUARES = 1e200  # sum of squares of rows and sensitivities that any damping leaves finite
 
 
 T = TypeVar("T")
@@ -80,7 +78,7 @@ def levenberg_marquardt(
         # squares that overflow, or will, are outside the range as much as what is no number
         with np.errstate(over="ignore", invalid="ignore"):
             gradient, normal = jacobian.T @ rows, jacobian.T @ jacobian
-            known = float(np.trace(normal) + rows @ rows) < _MOST_SQUARES
+            known = float(np.trace(normal) + rows @ rows) < 1e200
         if not known:
             raise SimulationError("the model's sensitivities are too large to be fitted")
         return evaluation, gradient, normal
@@ -88,7 +86,7 @@ def levenberg_marquardt(
     least = _STEP_SHARE if share is None else share
     x = np.clip(start, low, high)
     best, gradient, normal = evaluated(x)
-    spent, damping = 1, _FIRST_DAMPING
+    spent, damping = 1, 1e-4  # to begin with (Marquardt (1963))
     reached = [float(best[0] @ best[0])]  # by each evaluation
     while x.size and spent < evaluations:
         rows = best[0]

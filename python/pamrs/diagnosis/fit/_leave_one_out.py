@@ -26,9 +26,6 @@ _SOLE_SOURCE = 0.9
 _PIECES_LEFT_OUT = 5  # pieces of a single recording, each predicted by the others (decision 111)
 
 
-_RIDGE = 1e-9  # keeps a matrix invertible
-
-
 def predicted_by_others(
     problem: Problem, fitted: Fit, inflation: dict[str, float]
 ) -> dict[Key, Residual]:
@@ -66,7 +63,8 @@ def predicted_by_others(
     total = np.sum([normal for normal, _ in sums], axis=0) + np.diag(
         [1.0 if name in fitted.held_by_prior else 0.0 for name in names]
     )
-    total += _RIDGE * np.diag(np.maximum(np.diag(total), _RIDGE))
+    # what keeps it invertible
+    total += 1e-9 * np.diag(np.maximum(np.diag(total), 1e-9))
     root = np.linalg.inv(np.linalg.cholesky(total))
     out = dict(fitted.residuals)
     for part, (normal, gradient) in zip(parts, sums, strict=True):

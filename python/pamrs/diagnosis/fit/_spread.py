@@ -9,7 +9,7 @@ from pamrs._arrays import Array, Index
 from pamrs.diagnosis.fit._fitting import FIT_BIN_TIME, Fit, Key, Problem, bin_width, stacked
 from pamrs.diagnosis.prepare import Residual
 
-# [s] pieces that count as looks: longer than wrong residuals stay alike; arm windows are 2.5 s
+# [s] independent pieces: longer than wrong residuals stay alike; arm windows are 2.5 s
 PIECE_TIME = 5.0
 
 

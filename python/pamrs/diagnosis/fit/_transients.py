@@ -40,25 +40,19 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
 _SPACING = 0.5  # [s] distance of the times that are tried
-_FIRST_TIME = 0.25  # [s] first time that is tried
-_LAST_TIME = 0.5  # [s] time before the end of the recording from which none is tried
 # [s] before an event from which its signature counts: the smoothing of drives reaches back
 _EARLY = 0.1
 _LEAST_DISTANCE = 1.0  # [s] least time between two events
 _LEAST_EVENT_GAIN = 25.0  # [chi-square] gain from which an event counts (decision 20)
 # share of what the recording's residual is from which an event counts (decision 20)
 _EVENT_SHARE = 0.03
-_TIME_SCALE = 0.2  # [s] scale of an event's time in a fit
-_DURATION_SCALE = 0.4  # [s] scale of its duration
-_RISE_SCALE = 0.2  # [s] scale of the time of its edges
+_TIME_SCALE = 0.2  # [s] scale of an event's time, and of its edges' time, in a fit
 _FREQUENCY_SCALE = 0.01  # [Hz] scale of a frequency in a fit
 _LEAST_DURATION = 0.05  # [s] shortest duration of an event
 _MOST_DURATION = 5.0  # [s] longest duration of an event
 _LEAST_RISE = 0.02  # [s] shortest edge of an event (a blow)
 _MOST_RISE = 2.0  # [s] longest edge of an event (a hand)
 _MOST_EVENT_SIZE = 1e3  # [SI] largest size of an event that a fit may reach
-_EVALUATIONS_ALONE = 8  # evaluations of the fit of one recording's events at the most
-_EVALUATIONS_TOGETHER = 12  # evaluations of the fit of baseline and events of all recordings
 
 
 def events_of(effect: Term, form: str = "") -> list[list[EffectParameter]]:
@@ -100,8 +94,8 @@ def _scale(effect: Term, parameter: str) -> float:
     """Scale of an event's parameter in a fit [SI]."""
     scales = {
         "time": _TIME_SCALE,
-        "duration": _DURATION_SCALE,
-        "rise": _RISE_SCALE,
+        "duration": 2.0 * _TIME_SCALE,
+        "rise": _TIME_SCALE,
     }
     first = _first_of(effect, parameter)
     usual = _FREQUENCY_SCALE if first.unit == "Hz" else _first_value(effect.info.leading)
@@ -304,7 +298,7 @@ def _scan(
     slots = len(events_of(effect))
     typical = _first_value(effect.info.leading)
     length = prepared.n * prepared.dt
-    times = np.arange(_FIRST_TIME, length - _LAST_TIME, _SPACING)
+    times = np.arange(0.5 * _SPACING, length - _SPACING, _SPACING)
     rows, _ = stacked(problem, base, inflation)
     signatures: dict[float, Array] = {}
     for group in _spaced_groups(times, slots):
@@ -422,7 +416,9 @@ def _fit_alone(
 
     try:
         first = np.array([start[p] for p in free]) / scale
-        x, _, _ = levenberg_marquardt(evaluate, first, (low, high), _EVALUATIONS_ALONE)
+        x, _, _ = levenberg_marquardt(
+            evaluate, first, (low, high), alone.settings.effect_evaluations
+        )
     except SimulationError:
         return None
     return values_at(x)
@@ -455,12 +451,15 @@ def _fit_jointly(
     count = len(vector.names)
     try:
         x, (values, jacobian, by_block), spent = levenberg_marquardt(
-            vector.evaluate, vector.begin(baseline), vector.bounds(), _EVALUATIONS_TOGETHER
+            vector.evaluate,
+            vector.begin(baseline),
+            vector.bounds(),
+            problem.settings.fit_evaluations,
         )
     except SimulationError:
         return None
     covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True))
-    measured = values.size - count  # priors stand behind
+    measured = values.size - count  # priors come after
     wide = pieces_spread(
         values[:measured], jacobian[:measured], covariance, pieces_of(problem, by_block)
     )

@@ -28,8 +28,8 @@ _OTHER_SIZE = 1.3  # ratio of sizes from which they are not the same
 _EDGES = 100  # of the times in a recording at which an input may begin and end
 _MUCH_LARGER = 3.0  # ratio of root mean squares from which it is there at some times alone
 _LEAST_OF_SQUARE = 0.1  # share of its square in such a time
-_MOST_OF_TIME = 0.6  # share of a recording up to which that is told
-# share of the square that an argument leaves at least beside such times, and by so many times more
+_MOST_OF_TIME = 0.6  # share of a recording up to which that is said
+# share of the square that an argument leaves at least in such times, and by so many times more
 # than there is at all others
 _LEFT_BY_ARGUMENT, _MORE_THAN_OTHER_TIMES = 0.2, 5.0
 _MOST_TIMES = 5  # of an input in all recordings

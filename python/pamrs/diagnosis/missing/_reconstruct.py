@@ -17,7 +17,7 @@ from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Block, Input, Prepared, Residual, binned, residual
 from pamrs.errors import SimulationError
 
-_HAT = 0.04  # [s] from knot to knot: twice as fast as the bins that the residual is told in
+_HAT = 0.04  # [s] from knot to knot: twice as fast as the bins of the residual
 _MOST_KNOTS = 200  # of a window: a sealed chamber is one window, and its input is slow
 _CORRELATION = 6.0  # [knots] over which the input stays what it was
 _INPUT_SIZES = 10.0 ** np.arange(-2.0, 5.1, 0.25)  # of the input, in the noise levels that it moves

@@ -472,7 +472,7 @@ def _with_common_zeros(
     settled_candidates = list(chosen)
     for k, candidate in enumerate(chosen):
         part = replace(problem, blocks=judged[k].group.blocks)
-        # those that were held before too: a fit that frees one again is right beside its own only
+        # those that were held before too: a fit that frees one again is right with its own only
         common = {
             n: chosen[owner].fit
             for n, owner in owners.items()

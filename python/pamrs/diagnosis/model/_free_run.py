@@ -30,7 +30,6 @@ _FAR_ALONE = 5.0
 _OFF_NOISES = 5.0
 # chance of values so far from what is known as explain what the whole rig misses
 _OFF_CHANCE = 0.05
-_OFF_LATE = 0.5  # [samples] standard deviation of when a command takes effect, within its sample
 # [K] deviation of a gas's start that nothing tells: filled and vented it is 4 to 28 K off
 _OFF_WARM = 20.0
 # samples of a channel that compare what the whole rig misses: a course of some seconds
@@ -249,7 +248,8 @@ def _least_misses(
     def run(moved: Array) -> dict[str, Array]:
         allowed = np.clip(known.values + known.root @ moved[:count], low, high)
         values = dict(zip(known.names, allowed.tolist(), strict=True))
-        late = _with_late_commands(logged, _OFF_LATE * float(moved[count]))
+        # within its sample, one standard deviation being half of it
+        late = _with_late_commands(logged, 0.5 * float(moved[count]))
         warm = zip(starts.items(), moved[count + 1 :].tolist(), strict=True)
         begins = {name: start.kelvin + start.unsure * away for (name, start), away in warm}
         start = with_known(final, values)

@@ -53,7 +53,6 @@ from pamrs.simulation import Simulation, core_rig, reading
 _LEAST_PROBABILITY = 0.01  # probability below which a given hypothesis is not simulated
 # hypotheses that are simulated, the most probable ones (every pair is compared)
 _MOST_HYPOTHESES = 6
-_SETTLED_ENTROPY = 0.01  # [bit] uncertainty below which no experiment can add to the answer
 # [bit] difference of information that counts; below it the cheaper experiment is better
 _RESOLUTION = 0.02
 _LEAST_BITS = 0.05  # [bit] expected information below which an experiment parts nothing
@@ -383,7 +382,7 @@ def propose(
     records = [r.recording if isinstance(r, Prepared) else r for r in recordings]
     own = _channels(nominal, records, channels)
     uncertainty = entropy([p for _, _, p in chosen])
-    if len(chosen) < 2 or uncertainty < _SETTLED_ENTROPY:
+    if len(chosen) < 2 or uncertainty < 0.5 * _RESOLUTION:
         text = "One hypothesis is left; no experiment can add to that."
         return NextExperiment(text, {}, 0.0)
     pool = experiments_of(nominal, records, settings) if experiments is None else experiments

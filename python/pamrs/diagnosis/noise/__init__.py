@@ -16,6 +16,7 @@ from pamrs.diagnosis.noise._autocorrelation import (
 from pamrs.diagnosis.noise._discrepancy import curve_errors_of, whitening
 from pamrs.diagnosis.noise._levels import (
     LEAST_SIZE,
+    SIZE_SPREAD,
     Excess,
     NoiseLevel,
     bins_of,
@@ -31,6 +32,7 @@ from pamrs.diagnosis.noise._levels import (
 __all__ = [
     "CORRELATED_VARIANCE",
     "LEAST_SIZE",
+    "SIZE_SPREAD",
     "Excess",
     "NoiseLevel",
     "inflation_apart",

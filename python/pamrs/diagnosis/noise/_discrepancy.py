@@ -225,7 +225,7 @@ def _flowing(shares: Array, base: Residual) -> Array:
         used = np.flatnonzero(q[:, 0])
         if used.size == 0:
             continue
-        # over rows that are not used it fades as beside them
+        # over rows that are not used it fades as next to them
         level = np.interp(np.arange(b - a), used, np.log(np.abs(q[used, 0])))
         remembered = np.minimum(np.exp(np.diff(level)), 1.0)
         for i in range(a, b - 1):

@@ -29,9 +29,8 @@ _CURVE_REST = 0.02
 # shares of the usual error that are tried (decision 95)
 _ERROR_SHARES = (0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0)
 LEAST_SIZE = _ERROR_SHARES[0]  # share of the usual error that is hardly any
-# spread of the logarithm of an error's size, a factor of three (decision 95)
-_SIZE_SPREAD = math.log(3.0)
-_MOST_EXPONENT = 700.0  # that a double's exponential bears
+# spread of the logarithm of a size that nothing tells: a factor of three (decisions 14, 22, 95)
+SIZE_SPREAD = math.log(3.0)
 
 
 Array = NDArray[np.float64]
@@ -296,7 +295,7 @@ def _evidence(rows: Array, curves: Array, rest: Array, size: float) -> float:
     projected = c.T @ y
     square = float(y @ y - projected @ np.linalg.solve(normal, projected))
     volume = float(np.linalg.slogdet(normal)[1] + np.log(variance).sum())
-    prior = (math.log(size) / _SIZE_SPREAD) ** 2
+    prior = (math.log(size) / SIZE_SPREAD) ** 2
     return -0.5 * (square + volume + prior)
 
 
@@ -467,7 +466,8 @@ def _pooled(
     pooled = math.sqrt(float(np.sum((shares * random) ** 2)))
     scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.noise_replicates))
     chance = t(len(keys) * (settings.noise_replicates - 1))
-    beyond = min(float(chance.isf(settings.noise_chance)) * scatter, _MOST_EXPONENT)
+    # as much as a double's exponential bears
+    beyond = min(float(chance.isf(settings.noise_chance)) * scatter, 700.0)
     # the model has one error, the same in all recordings, and its square is that of a few numbers
     curve_share = float(np.sum(shares * [noise_level[key].curve_share for key in keys]))
     larger = 1.0 + curve_share * (

@@ -36,6 +36,7 @@ from pamrs.diagnosis.prepare._checks import (
 from pamrs.diagnosis.prepare._copies import overlap, without_copies
 from pamrs.diagnosis.prepare._plausibility import without_impossible
 from pamrs.diagnosis.prepare._residual import (
+    CLEARLY_LESS,
     Residual,
     blocks_with_tanks,
     change,
@@ -50,6 +51,8 @@ from pamrs.diagnosis.prepare._residual import (
     with_tanks,
 )
 from pamrs.diagnosis.prepare._signals import (
+    NOISE_STDS,
+    ROUNDING,
     Prepared,
     binned,
     noise_level,
@@ -60,6 +63,9 @@ from pamrs.diagnosis.prepare._signals import (
 )
 
 __all__ = [
+    "CLEARLY_LESS",
+    "NOISE_STDS",
+    "ROUNDING",
     "averaged",
     "averaged_to_need",
     "notes_on_beginnings",

@@ -28,7 +28,7 @@ from pamrs.diagnosis.prepare._residual import (
     predicted,
     residual,
 )
-from pamrs.diagnosis.prepare._signals import Prepared
+from pamrs.diagnosis.prepare._signals import NOISE_STDS, Prepared
 from pamrs.errors import SimulationError
 from pamrs.rig.schema import qualified
 
@@ -44,8 +44,6 @@ _SILENT_DELAYS = 0.6
 _STILL_DELAYS = 4.0
 # [noise levels] flow before, ends seen at rest: 3 to 6 at rest, 65 in a flow (decision 109)
 _STILL_NOISES = 10.0
-# [standard deviations] trend of a pressure that is seen as its recording begins
-_STILL_DEVIATIONS = 3.0
 # times likelier rest than flow as a tube is opened: e^75 there, e^5 at a turn (decision 109)
 _REST_LIKELIHOOD = 1000.0
 
@@ -128,7 +126,7 @@ def _begins_at_rest(
         from_start = replace(prepared, at_rest=channels, _start_states={})
         missed.append(_first_window_misfit(block, core, from_start, tolerances))
     from_speed, from_rest = missed
-    return from_speed - from_rest > _STILL_DEVIATIONS**2
+    return from_speed - from_rest > NOISE_STDS**2
 
 
 def _first_window_misfit(
@@ -227,7 +225,7 @@ class _Beginnings:
             rows = np.flatnonzero(recording.mask[name][:early])
             if rows.size < WINDOW_SAMPLES_PER_STATE:
                 return False
-            if abs(_trend(self.prepared, name, rows)) > _STILL_DEVIATIONS:
+            if abs(_trend(self.prepared, name, rows)) > NOISE_STDS:
                 return False
         return bool(names)
 

@@ -26,8 +26,8 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import keys_of, qualified
 
 # [s] a joint's windows: its start has faded, a wrong break-away spoils no more (decision 14)
-_ARM_WINDOW = 2.5
-_SUPPLY_WINDOW = 4.0  # [s] windows of a tank or a regulator
+ARM_WINDOW = 2.5
+SUPPLY_WINDOW = 4.0  # [s] windows of a tank or a regulator
 _CHAMBER_WINDOW = 2.0  # [s] windows of a chamber that is fed; a sealed one is one window
 _LEAST_PRESSURE_SHARE = 0.01  # share of the ambient pressure that a noisy gauge shows at the least
 # [s] longest step of joints and loads: an error of 0.03 noises, 0.17 at most (decision 57)
@@ -511,7 +511,7 @@ class _BlockMap:
             full,
             self.pressure(full),
             drives,
-            _SUPPLY_WINDOW,
+            SUPPLY_WINDOW,
             frozenset(self.moved("supply", name)),
             _GAS_STEP,
             covers,
@@ -629,7 +629,7 @@ class _BlockMap:
             qualified("arm", joint),
             dotted("joint_angle", joint),
             tuple(map(self.pressure, chambers)),
-            _ARM_WINDOW,
+            ARM_WINDOW,
             frozenset(names | self.of_motion(joints) | self.zeros(chambers, joints)),
             _ARM_STEP,
             "muscle, joint and arm" + _called(joint),
@@ -643,7 +643,7 @@ class _BlockMap:
             "load",
             "length",
             tuple(map(self.pressure, chambers)),
-            _ARM_WINDOW,
+            ARM_WINDOW,
             frozenset(
                 self.of("load", "") | self.of("muscle", *self.pulling) | self.zeros(chambers, ())
             ),

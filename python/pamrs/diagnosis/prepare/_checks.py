@@ -20,6 +20,7 @@ from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.prepare._blocks import Block, available_blocks
 from pamrs.diagnosis.prepare._copies import without_copies
 from pamrs.diagnosis.prepare._plausibility import (
+    MOST_LISTED,
     frozen_tanks,
     impossible_motion,
     impossible_pressures,
@@ -386,12 +387,10 @@ CHECKS: Final = (
 """Every check, in the order in which it is asked."""
 
 _BEFORE: Final = [check for check in CHECKS if not check.prepared]
-_MOST_ITEMS: Final = 12
-"""Findings that a message lists."""
 _LOOKED_AT: Final = 20_000
 """Samples of a proposed recording that are looked at: all of a log would take long."""
-_ASKED: Final = 8
-"""Questions about a log, at most."""
+_FEW: Final = 8
+"""Questions about a log, or parts of it, that are listed."""
 
 
 @dataclass(frozen=True)
@@ -482,8 +481,8 @@ def _without_faulty(
 
 def _not_of_rig(case: str, findings: Sequence[str]) -> str:
     """Message on evidence that recordings are not of the rig of their case."""
-    more = len(findings) - _MOST_ITEMS
-    lines = [*findings[:_MOST_ITEMS], *[f"and {more} more of this kind"] * (more > 0)]
+    more = len(findings) - MOST_LISTED
+    lines = [*findings[:MOST_LISTED], *[f"and {more} more of this kind"] * (more > 0)]
     return joined(
         f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", lines
     )
@@ -545,7 +544,7 @@ def questions(proposed: LogProposal, rig: Rig, settings: DiagnosisSettings) -> l
         part = recording.between(stop=min(recording.duration, _LOOKED_AT * recording.sample_time))
         one = Case(part.name, rig, [part], Path())
         found += implausible(part, rig, settings) or _turned(one, settings).texts
-    return list(dict.fromkeys(found))[:_ASKED]
+    return list(dict.fromkeys(found))[:_FEW]
 
 
 def left_out(case: Case, faults: Mapping[str, str]) -> tuple[Case, list[str]]:
@@ -644,9 +643,6 @@ def _lacking(case: Case) -> str:
     return ", ".join(missing)
 
 
-_FEW: Final = 8  # parts that are named
-
-
 def noted_units(case: Case) -> list[str]:
     """Sentences on what the files of a case do not say: units that were assumed, ambient pressures
     that were subtracted, parts that no recording takes.
@@ -700,8 +696,6 @@ def suspected_units(case: Case) -> list[str]:
     return [f"{', '.join(where[channel])}: {text}" for channel, text in evidence.items()]
 
 
-# [tolerances] of a room from that of the rig file, from which it may be another one
-_ROOM_TOLERANCES = 3.0
 # [K] between recordings' rooms, taken for one: it moves a valve's flow by one percent
 _MOST_ROOM_SPREAD = 3.0
 
@@ -796,7 +790,7 @@ def _doubted(value: float, stated: Parameter, settings: DiagnosisSettings) -> li
         return []
     limits = [settings.most_room_change]
     if stated.tol > 0.0:
-        limits.append(_ROOM_TOLERANCES * stated.tol)
+        limits.append(settings.most_tolerances * stated.tol)
     away = abs(value - stated.value)
     if away <= min(limits):
         return []
@@ -808,7 +802,7 @@ def _doubted(value: float, stated: Parameter, settings: DiagnosisSettings) -> li
     ]
 
 
-# samples beside one at its sensor's end, masked as well: their noise is cut off on one side
+# samples next to one at its sensor's end, masked as well: their noise is cut off on one side
 _RAIL_SAMPLES = 3
 
 

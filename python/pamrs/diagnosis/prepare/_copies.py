@@ -25,13 +25,10 @@ from scipy.ndimage import uniform_filter1d
 
 from pamrs._arrays import Array, Index, Mask, stretches
 from pamrs.channels import channel_of
+from pamrs.diagnosis.prepare._blocks import ARM_WINDOW, SUPPLY_WINDOW
 from pamrs.recordings import Recording
 
 _COPY_SHARE = 0.5  # share of a recording that is in another one of its role before it is left out
-# [s] between what is shared and what is kept: within it a joint's past fades (decision 111)
-_GAP = 2.5
-# [s] of a held-out recording that is kept as a proof: two long windows (decision 111)
-_LEAST_LEFT = 8.0
 _MOST_RATE_RATIO = 50.0  # ratio of sample times up to which recordings are compared
 
 
@@ -125,7 +122,8 @@ def _unshared_stretches(
     channels: _ChannelDeviations,
 ) -> list[tuple[float, float]]:
     """Stretches that share nothing with any recording of another role, long enough for a proof."""
-    least = max(_LEAST_LEFT, LEAST_SAMPLES * recording.sample_time)
+    # two of the longest windows are a proof (decision 111)
+    least = max(2.0 * SUPPLY_WINDOW, LEAST_SAMPLES * recording.sample_time)
     stretches_left: list[tuple[float, float]] = []
     for start, stop in free:
         if stop - start < least:
@@ -196,7 +194,8 @@ def overlap(
         / max(at[1] - at[0], 1e-300)
         / max(one.duration, 1e-300),
     )
-    margin = _GAP + WINDOW_SAMPLES * slow.sample_time
+    # within a window a joint's past fades (decision 111)
+    margin = ARM_WINDOW + WINDOW_SAMPLES * slow.sample_time
     return Overlap(in_one, in_other, share, _gaps(one.duration, runs, margin))
 
 
@@ -215,7 +214,7 @@ def _shared_mask(alignment: _SharedRows) -> Mask:
         new_rows[first:last] = last - first >= LEAST_SAMPLES
     for first, last in stretches(~new_rows & ~shared & alignment.inside):
         neighbours = new_rows[[k for k in (first - 1, last) if 0 <= k < new_rows.size]]
-        # what cannot be told is new where noise of its own is on both sides; so is part of a window
+        # what is not clear is new where noise of its own is on both sides; so is part of a window
         part = last - first < WINDOW_SAMPLES
         new = neighbours.any() if part else neighbours.size == 2 and neighbours.all()
         shared[first:last] = not new
@@ -266,19 +265,18 @@ _BETWEEN_LEFT = 1.6
 _LEAST_ALIVE = 0.2
 # samples of a window in which noise is compared: its mean differs by a tenth by chance
 WINDOW_SAMPLES = 64
-LEAST_SAMPLES = 192  # samples that are shared at the least: three windows
+LEAST_SAMPLES = 3 * WINDOW_SAMPLES  # that are shared at the least
 _LAGS = 8  # shifts in time that are looked at
-# neighbours on either side by which a sample is told without the other recording
+# neighbours on either side by which a sample is predicted without the other recording
 _NEIGHBOURS = 4
 # samples of a block that is looked for in a recording whose clock goes otherwise
 _BLOCK_SAMPLES = 256
 
 
 _SET: Final = ("valve_command", "supply_command", "reference")
-_TAPS: Final = 8  # deviations on either side by which one of the other recording is told
+_TAPS: Final = 8  # deviations on either side by which one of the other recording is predicted
 _SOON: Final = 4  # samples within which a flip of a converter goes back
 _ROWS: Final = 20_000  # rows from which a linear combination of a few columns is found
-_TINY: Final = 1e-300  # keeps a quotient finite
 
 
 def is_set(name: str) -> bool:
@@ -390,7 +388,7 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     moves = inner & ~(np.r_[False, flat] & np.r_[flat, False])
     counted = moves if moves.sum() > 4 * _NEIGHBOURS else inner  # a rest says nothing of the noise
     use, deviations, weights = counted, centred, np.zeros(offsets.size)
-    for _ in range(4):  # steps of the signal do not say how noise is told
+    for _ in range(4):  # steps of the signal do not say how noise is predicted
         if use.sum() < 2 * offsets.size:
             break
         weights, follows = _prediction_by(centred, offsets, centred, use)
@@ -403,7 +401,7 @@ def _channel(values: Array, known: Mask) -> _Deviations:
     coarse = step if step > _COARSE_STEP * noise else 0.0
     if not size > 1e-12 * float(np.abs(centred).max()):
         return _Deviations(filled, known, nothing, coarse)
-    # a step of the signal is left in all samples beside it
+    # a step of the signal is left in all samples around it
     steps = uniform_filter1d((counted & ~use).astype(float), 4 * _NEIGHBOURS + 1) > 1e-6
     return _Deviations(filled, known, np.where(inner & ~steps, deviations / size, 0.0), coarse)
 
@@ -514,7 +512,7 @@ def _rate(
                 block = np.interp(rows, np.arange(_BLOCK_SAMPLES), part)
                 cross = irfft(spectrum * np.conj(rfft(_single(block), length)), length)
                 place = int(np.argmax(np.abs(cross)))
-                peaks.append(abs(float(cross[place])) / (float(np.linalg.norm(block)) + _TINY))
+                peaks.append(abs(float(cross[place])) / (float(np.linalg.norm(block)) + 1e-300))
                 places.append(place if place < other.size else place - length)
             line = np.polyfit(starts * slow.sample_time, places, 1)
             off = np.abs(np.polyval(line, starts * slow.sample_time) - places)
@@ -617,7 +615,7 @@ def _by_window(a: _Deviations, b: _Deviations) -> tuple[Mask, Mask, bool]:
             (use & (b.deviations != 0.0)).astype(float),
         )
     )
-    share = product / np.sqrt(np.maximum(own_power * other, _TINY))
+    share = product / np.sqrt(np.maximum(own_power * other, 1e-300))
     says = alive > _LEAST_ALIVE
     chance = _CHANCE_SHARE / np.sqrt(np.maximum(alive * WINDOW_SAMPLES, 1.0))
     alike = says & (share > np.maximum(_FOLLOW_SHARE, chance))
@@ -710,11 +708,11 @@ def _fraction(a: _Deviations, b: _Deviations, dt: float) -> float | None:
     for _ in range(8):
         rest = a.values[:size] - curve(np.clip(index + lag, 0.0, size - 1.0))
         power = float(np.sum(slope[inner] ** 2))
-        lag += float(np.sum((slope * rest)[inner])) / max(power, _TINY)
+        lag += float(np.sum((slope * rest)[inner])) / max(power, 1e-300)
         if not abs(lag) < 2.0:
             return None
     noise = float(np.std(rest[inner]))
-    unsure = noise / np.sqrt(max(power, _TINY))
+    unsure = noise / np.sqrt(max(power, 1e-300))
     whole = min((round(lag * n) / n for n in (2, 3)), key=lambda part: abs(part - lag))
     off = abs(whole - lag) > max(3.0 * unsure, _BETWEEN_ERROR)
     if off or unsure > _BETWEEN_ERROR or abs(whole - round(whole)) < 1e-9:

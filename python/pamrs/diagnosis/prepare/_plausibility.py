@@ -21,7 +21,7 @@ from pamrs._arrays import Array, Mask, stretches
 from pamrs.channels import block_of, channel_of, dotted, unit_of, with_trait
 from pamrs.diagnosis.prepare._blocks import Block
 from pamrs.diagnosis.prepare._residual import predicted
-from pamrs.diagnosis.prepare._signals import Prepared, moves_by_gauges
+from pamrs.diagnosis.prepare._signals import NOISE_STDS, Prepared, moves_by_gauges
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import SimulationError
 from pamrs.findings import Faulty
@@ -33,21 +33,21 @@ from pamrs.units import in_words
 _LEAST_PEAK_PRESSURE = 100.0
 # [Pa] no pressure is lower: a vacuum is at -101 kPa, and a transducer errs
 _LEAST_GAUGE_PRESSURE = -1.1e5
-# multiple of the largest pressure of the rig file that is allowed above that
+# multiple of a pressure of the rig file, the largest or a supply's, that is allowed
 _MOST_RATED_MULTIPLE = 5.0
 # highest measured supply pressure over that of the rig file, at the least
 _SUPPLY_LEAST_SHARE = 0.05
-_SUPPLY_MOST_SHARE = 5.0  # highest measured supply pressure over that of the rig file, at the most
 # share of the supply's pressure by which a muscle's may exceed it (errors of two transducers)
 _ORDER_MARGIN = 0.05
 _ORDER_OFFSET = 1e4  # [Pa] pressure by which it may exceed it besides (zeros of two transducers)
-_ORDER_TIME_SHARE = 0.5  # share of the time for which it may exceed it by more
+# share of the time for which it may exceed it by more, or a command its span
+_MOST_TIME_SHARE = 0.5
 _LEAST_ANGLE_MARGIN = 0.1  # [rad] by which a joint may leave its range at the least
 _LEAST_LENGTH_MARGIN = 0.01  # [m] by which a load may leave its range at the least
 _RANGE_TIME_SHARE = 0.2  # share of the time for which it may leave its range by more
 _FASTEST_LOAD = 20.0  # [m/s] speed of a load that one sample in a hundred may exceed
-# [Pa] change of a muscle's pressure while its tank cannot read one and the same value
-_FROZEN_TANK_CHANGE = 2e4
+# [Pa] change of a muscle's pressure that moves its tank's, and from which its sense is tested
+_LEAST_CHANGE = 2e4
 # relative change of pressures during which what they move cannot read one and the same value
 _FROZEN_MOTION_SHARE = 0.1
 # share of a pressure's change against its command; motion and leaks do some of it as well
@@ -66,11 +66,7 @@ _DEAD_COMMAND_STILL = 0.02
 _DEAD_COMMAND_RATIO = 1.5
 # quantile of a regulator's command that is its largest; above are a logger's spikes
 _COMMAND_QUANTILE = 0.995
-_COMMAND_TIME_SHARE = 0.5  # share of the time for which a command may be beyond that
 _SENSE_TIME = 0.1  # [s] time over which a change of pressure is compared with the command
-_SENSE_LEAST_CHANGE = 2e4  # [Pa] range of a muscle's pressure below which its sense is not tested
-# [noise levels] standard deviation of an angle below which its unit and sign are not tested
-_SENSE_LEAST_NOISES = 3.0
 # [standard deviations] misfit of an angle as recorded from which its unit or sign may be wrong
 _SENSE_WRONG = 1.0
 # [standard deviations] misfit in another unit or sign below which that is the right one
@@ -78,9 +74,8 @@ _SENSE_RIGHT = 0.4
 
 
 _PRESSURE_CHANNELS = with_trait("pressure")
-_DEGREES = 180.0 / math.pi  # of a radian
-_MOST_SPANS = 12
-"""Stretches that a message lists."""
+MOST_LISTED = 12
+"""Findings, or stretches of a recording, that a message lists."""
 
 
 def without_impossible(
@@ -157,9 +152,9 @@ def _when(bad: Mask, recording: Recording) -> str:
     """The first stretches in which something is, in seconds."""
     pairs = stretches(bad)
     spans = [
-        f"{recording.time[a]:.4g} to {recording.time[b - 1]:.4g} s" for a, b in pairs[:_MOST_SPANS]
+        f"{recording.time[a]:.4g} to {recording.time[b - 1]:.4g} s" for a, b in pairs[:MOST_LISTED]
     ]
-    more = f" and {len(pairs) - _MOST_SPANS} more stretches" * (len(pairs) > _MOST_SPANS)
+    more = f" and {len(pairs) - MOST_LISTED} more stretches" * (len(pairs) > MOST_LISTED)
     return ", ".join(spans) + more
 
 
@@ -227,11 +222,11 @@ def impossible_pressures(
             size, command = rated[name]
             source = f"the largest {command} is" if command else "the rig file has"
             low_end = _SUPPLY_LEAST_SHARE * min(size, _in_front(recording, rig, block_of(name)))
-            if size > 0.0 and not low_end <= high <= _SUPPLY_MOST_SHARE * size:
+            if size > 0.0 and not low_end <= high <= _MOST_RATED_MULTIPLE * size:
                 yield (
                     f"{name} is at most {_text(recording, name, high)} and {source} "
                     f"{_text(recording, name, size)}; "
-                    f"{_text(recording, name, low_end, _SUPPLY_MOST_SHARE * size)} is allowed: "
+                    f"{_text(recording, name, low_end, _MOST_RATED_MULTIPLE * size)} is allowed: "
                     "right column and unit?"
                 )
 
@@ -287,7 +282,7 @@ def frozen_tanks(recording: Recording, rig: Rig, _: DiagnosisSettings) -> Iterat
             for c in rig.tables("chamber")
             if (v := _values(recording, dotted("muscle_pressure", c))).size
         ]
-        if any(float(np.ptp(v)) > _FROZEN_TANK_CHANGE for v in moved):
+        if any(float(np.ptp(v)) > _LEAST_CHANGE for v in moved):
             yield (
                 f"{name} has the one value {_text(recording, name, values[0], digits='.6g')} "
                 "throughout although its tank is drawn from: a frozen transducer; leave "
@@ -333,14 +328,14 @@ def swapped_pressures(recording: Recording, rig: Rig, _: DiagnosisSettings) -> I
             allowed = limit + _ORDER_MARGIN * np.abs(limit) + _ORDER_OFFSET
             above = recording.channels[name][rows] > allowed
             share = float(np.mean(above))
-            if share > _ORDER_TIME_SHARE:
+            if share > _MOST_TIME_SHARE:
                 median, other = (
                     _text(recording, name, float(np.median(median)))
                     for median in (recording.channels[name][rows], limit)
                 )
                 yield (
                     f"{name} is above {source} for {100 * share:.0f} % of the time (medians "
-                    f"{median} and {other}); at most {100 * _ORDER_TIME_SHARE:.0f} % is allowed: "
+                    f"{median} and {other}); at most {100 * _MOST_TIME_SHARE:.0f} % is allowed: "
                     "are the two columns swapped, or one of their units wrong?"
                 )
 
@@ -478,7 +473,7 @@ def reversed_valves(recording: Recording, rig: Rig, _: DiagnosisSettings) -> Ite
             continue
         opening = (recording.channels[name] - table["null_voltage"]) / table["half_range"]
         beyond = float(np.mean(np.abs(opening[both]) > _COMMAND_SPAN))
-        if beyond > _COMMAND_TIME_SHARE:
+        if beyond > _MOST_TIME_SHARE:
             middle = float(np.median(recording.channels[name][both]))
             yield (
                 f"{name} is beyond twice its valve's range for {100 * beyond:.0f} % of the time "
@@ -506,7 +501,7 @@ def reversed_valves(recording: Recording, rig: Rig, _: DiagnosisSettings) -> Ite
         )
         if (
             rows.size < 32
-            or moved < _SENSE_LEAST_CHANGE
+            or moved < _LEAST_CHANGE
             or not np.ptp(towards) > 0.0
             or not np.ptp(change) > 0.0
         ):
@@ -664,7 +659,7 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         prepared.recording.channels[block.channel][rows],
         predicted(block, core, prepared)[rows],
     )
-    still = float(np.std(measured)) < _SENSE_LEAST_NOISES * prepared.noise[block.channel]
+    still = float(np.std(measured)) < NOISE_STDS * prepared.noise[block.channel]
     if still or _misfit(measured, model) < _SENSE_WRONG:
         return None
     signals, name = prepared.signals, block.channel
@@ -672,16 +667,17 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
     span = _text(prepared.recording, name, measured.min(), measured.max())
     shown = f"{name} goes from {span}, not as the model says"
     turned = float(np.median(measured + model))
+    degrees = math.degrees(1.0)
     factors = [
         (
-            _DEGREES,
+            degrees,
             0.0,
-            f"{_DEGREES:.3g} times that would: are its values in rad under a heading in deg?",
+            f"{degrees:.3g} times that would: are its values in rad under a heading in deg?",
         ),
         (
-            1.0 / _DEGREES,
+            1.0 / degrees,
             0.0,
-            f"{1.0 / _DEGREES:.3g} times that would: are its values in deg under a heading in rad?",
+            f"{1.0 / degrees:.3g} times that would: are its values in deg under a heading in rad?",
         ),
         (
             -1.0,

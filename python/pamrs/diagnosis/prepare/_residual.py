@@ -16,7 +16,7 @@ from pamrs._arrays import Array, Mask
 from pamrs._views import in_laboratory_units
 from pamrs.channels import block_of, channel_of, dotted, with_trait
 from pamrs.diagnosis.prepare._blocks import Block, Input, available_blocks
-from pamrs.diagnosis.prepare._signals import DRIVES, Prepared
+from pamrs.diagnosis.prepare._signals import DRIVES, NOISE_STDS, Prepared
 from pamrs.errors import SimulationError
 from pamrs.recordings import OwnValue, Recording
 from pamrs.report.text import format_number
@@ -70,10 +70,6 @@ class TimeBefore(NamedTuple):
         return extended
 
 
-# standard deviations of an unmeasured start of a gas between what it can be at the most
-_START_DEVIATIONS = 4.0
-# repetitions of a prediction until the temperature at which its gas begins stands still
-_START_STEPS = 5
 # usable samples of a window for each state whose start is projected out, or it is not used
 WINDOW_SAMPLES_PER_STATE = 4
 
@@ -310,7 +306,7 @@ class _GasStart:
         gauges = [prepared.signals[n][0] for n in pressures if n in prepared.signals]
         first = float(gauges[0][0])
         bounds = block.warm.range_at(first, max(float(v.max()) for v in gauges))
-        wide = (bounds[1] - bounds[0]) / _START_DEVIATIONS
+        wide = (bounds[1] - bounds[0]) / 4.0  # standard deviations
         least = prepared.settings.begun_temperature_error
         return cls(block.warm.room, *bounds, max(wide, least))
 
@@ -455,7 +451,7 @@ def _from_its_start(
     rows = prepared.usable(block.channel, block.drives, starts)[first]
     measured = np.where(rows, prepared.recording.channels[block.channel][first], 0.0)
     begins = gas.room
-    for _ in range(_START_STEPS):
+    for _ in range(5):  # until it stands still
         prediction, jacobian, _ = with_slopes
         start = np.where(rows[:, None], jacobian[first, len(names) :], 0.0)
         columns = _start_columns(block, start, starts[0], prepared)
@@ -668,10 +664,7 @@ def notes_on_tanks(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepa
     return notes
 
 
-# steps to find a recording's own value, each at most a factor 3: 3 orders and a few to settle
-_OWN_STEPS = 12
 _OWN_APART = 1.5  # ratio of such values between recordings from which it is said
-_SHAKEN = 1e-3  # share by which a pressure is moved for the slope of what begins at it
 _BEGINS = "initial_pressure"
 
 
@@ -780,7 +773,7 @@ def with_own_values(
         rows, slopes = rows_at(values, free)
         moved = []
         for k in range(len(free), values.size):
-            step = _SHAKEN * max(abs(values[k]), 1e5)
+            step = 1e-3 * max(abs(values[k]), 1e5)  # of a pressure, for the slope
             shaken = rows_at(values + step * (np.arange(values.size) == k), [])[0]
             moved.append((rows - shaken) / step)
         return float(rows @ rows), rows, np.column_stack([slopes, *moved])
@@ -790,7 +783,7 @@ def with_own_values(
         size, rows, slopes = misfit(values)
     except SimulationError:
         return prepared  # the fit says what cannot be predicted
-    for _ in range(_OWN_STEPS):
+    for _ in range(12):  # each at most a factor 3: three orders and a few to settle
         scale = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
         step = np.linalg.lstsq(slopes / scale, rows, rcond=1e-9)[0] / scale
         # what is positive stays so: by no more than to a third or to three times at once
@@ -833,10 +826,8 @@ def notes_on_own_values(recordings: Sequence[Prepared]) -> list[str]:
     return notes
 
 
-_STRUT = 1e9  # [N] buckling load of a muscle that pushes back as its force model says
-_APART_NOISES = 3.0  # noise levels by which a push shows
 _LEAST_SLACK_SHARE = 0.01  # of the samples of a recording in which it has to
-_BETTER = 0.5  # share of what is missed there that is left with a push, where the lag is of that
+CLEARLY_LESS = 0.5  # share of an error below which what another model leaves is clearly less
 
 
 def notes_on_slack(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
@@ -852,7 +843,8 @@ def notes_on_slack(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepa
     moving = [block for block in blocks if block.kind == "arm"]
     if not slack or not moving:
         return []
-    loads = {f"{name}.buckling_load": _STRUT for name in slack}
+    # [N] what no muscle reaches: it pushes back as its force model says
+    loads = {f"{name}.buckling_load": 1e9 for name in slack}
     cores = core_rig(rig), core_rig(rig.with_parameters(loads))
     notes = []
     for block in moving:
@@ -882,10 +874,10 @@ def _lag(
         return 0.0, 0.0
     starts = prepared.starts(block.window, block.drives)
     rows = prepared.usable(block.channel, block.drives, starts)
-    rows &= np.abs(pushing - slack) > _APART_NOISES * prepared.noise[block.channel]
+    rows &= np.abs(pushing - slack) > NOISE_STDS * prepared.noise[block.channel]
     measured = prepared.recording.channels[block.channel][rows]
     lag, rest = measured - slack[rows], measured - pushing[rows]
     rare = rows.sum() < _LEAST_SLACK_SHARE * prepared.n
-    if rare or np.linalg.norm(rest) > _BETTER * np.linalg.norm(lag):
+    if rare or np.linalg.norm(rest) > CLEARLY_LESS * np.linalg.norm(lag):
         return 0.0, 0.0
     return float(np.abs(lag).max()), float(np.abs(rest).max())

@@ -22,6 +22,9 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig, supplies_of
 
+# standard deviations by which noise may move a value: one in 370 is moved farther
+NOISE_STDS = 3.0
+ROUNDING = 1e-6  # share, noise level or square of one below which a number is rounding
 # chance that noise alone shortens the filter: a corner has to miss more (decision 22)
 _SMOOTHING_ODDS = 1e-3
 # samples of each spectrum in which a band quieter than the noise is sought (decision 22)
@@ -30,15 +33,13 @@ _SPECTRUM_SAMPLES = 64
 _LEAST_SPECTRA = 16
 # variance share below which the quietest band is the noise: white noise has 0.38 (decision 22)
 _BAND_SHARE = 0.25
-# [s] stretches beside a start that give value and slope; the longest that fits (decision 22)
+# [s] stretches at a start that give value and slope; the longest that fits (decision 22)
 _START_REACHES = (0.04, 0.08, 0.16)
 # variance over that of the noise up to which a cubic fits such a stretch (decision 22)
 _START_MISFIT = 1.1
-# deviations of that variance allowed beside it, for the shortest stretch (decision 22)
-_START_FIRST_STDS = 2.0
-_START_LONGER_STDS = 1.5  # deviations allowed for longer stretches (decision 22)
-# deviations by which slopes of two stretches may differ (Lepski 1991, decision 22)
-_START_SLOPE_STDS = 2.0
+# deviations by which the shortest stretch may have more, and slopes of two differ (Lepski 1991)
+_START_STDS = 2.0
+_START_LONGER_STDS = 1.5  # by which longer ones may have more (decision 22)
 _START_LEAST_SAMPLES = 8  # fewest samples of a stretch: a cubic takes four
 _BRIDGED_SAMPLES = 3  # longest hole in a driving signal that is bridged
 # usual change of a command over as many samples beyond which it steps in a hole: a sine has 1.4
@@ -55,8 +56,6 @@ _LEAST_CHANNEL_SHARE = 0.2  # share of a channel's samples that must be usable
 
 Lengths = Index
 
-_TERMS = 4
-"""Terms of a cubic."""
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels at which a rig is cut, without the names of blocks."""
@@ -378,12 +377,12 @@ def _is_one_cubic(values: Array, noise: float, length: int) -> bool:
     missed = values - _cubic(values)(np.arange(values.size))
     pieces = missed[: values.size // length * length].reshape(-1, length)
     count = len(pieces)
-    if count <= _TERMS:
+    if count <= 4:
         return False
     means = pieces.mean(axis=1) * (math.sqrt(length) / noise)
     spread = 1.0 + 2.0 * float(norm.isf(_SMOOTHING_ODDS)) * math.sqrt(2.0 / values.size)
     return bool(
-        means @ means <= chi2.isf(_SMOOTHING_ODDS, count - _TERMS)
+        means @ means <= chi2.isf(_SMOOTHING_ODDS, count - 4)
         and np.abs(means).max() <= norm.isf(0.5 * _SMOOTHING_ODDS / count)
         and float(np.mean(missed**2)) <= spread * noise**2
     )
@@ -391,7 +390,7 @@ def _is_one_cubic(values: Array, noise: float, length: int) -> bool:
 
 def _cubic(values: Array) -> Polynomial:
     """The cubic of least squares through a channel, over the numbers of its samples."""
-    return Polynomial.fit(np.arange(values.size), values, _TERMS - 1)
+    return Polynomial.fit(np.arange(values.size), values, 3)
 
 
 def smoothed(values: Array, dt: float, lengths: Lengths) -> tuple[Array, Array]:
@@ -465,10 +464,10 @@ def _state(
         cubic = inverse @ (powers.T @ values[rows])
         rest = values[rows] - powers @ cubic
         slope = float(cubic[1]) / (count * dt)
-        scatters = _START_LONGER_STDS if state is not None else _START_FIRST_STDS
+        scatters = _START_LONGER_STDS if state is not None else _START_STDS
         most = _START_MISFIT + scatters * math.sqrt(2.0 / (count - 4))
         rough = float(rest @ rest) > most * (count - 4) * noise**2
-        if state is not None and (rough or abs(slope - state[1]) > _START_SLOPE_STDS * spread):
+        if state is not None and (rough or abs(slope - state[1]) > _START_STDS * spread):
             break
         if not rough:
             state, spread = (

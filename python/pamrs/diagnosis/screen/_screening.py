@@ -30,7 +30,7 @@ from pamrs.diagnosis.fit import (
     stacked,
     starts_of,
 )
-from pamrs.diagnosis.prepare import Block, Residual
+from pamrs.diagnosis.prepare import ROUNDING, Block, Residual
 from pamrs.effects import EffectParameter, Term
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -43,14 +43,13 @@ _LEAST_SIGNATURE_SIZE = 0.002
 _REPEAT_BELOW = 0.3
 # signatures of one start at the most, each at the size that the last one suggested
 _MOST_SIGNATURES = 3
-# [typical sizes] sizes at which each start is looked at beside a strong mismatch (decision 13)
+# [typical sizes] sizes at which each start is tried where a mismatch is strong (decision 13)
 STRONG_SIZES = (0.05, 0.3, 4.0, 20.0)
-_INVISIBLE = 1e-6  # [noise levels^2] squared length below which a signature is none (rounding)
 _THRESHOLD_LEVELS = 6  # levels of a channel that are tried for the thresholds of a switch
 _THRESHOLD_PRECISION = 5e-3  # share of the channel's range to which they are narrowed down
 # quantiles of a channel tried as a place of contact; from above at the others
 _PLACE_SHARES = (0.5, 0.75, 0.93)
-# parts of a valve's largest opening at which a restriction beside it is tried
+# parts of a valve's largest opening at which a restriction next to it is tried
 _OPENING_SHARES = (0.6, 3.0)
 
 
@@ -152,7 +151,7 @@ class Screen:
             if effect.excluded_by(without):
                 continue
             power = space.power(signature)
-            if power < _INVISIBLE:
+            if power < ROUNDING:
                 continue
             size, gain = _best_size(float(space.left @ signature), power, start)
             scores.append(Score(effect, start, gain, size, signature))
@@ -166,7 +165,7 @@ def _best_size(along: float, power: float, start: Start) -> tuple[float, float]:
     ``along`` is the product of what is left of the residual with the signature, ``power`` that of
     the signature with itself.
     """
-    if power < _INVISIBLE:
+    if power < ROUNDING:
         return 0.0, 0.0
     low = -_MOST_LINEAR if start.signed else _LEAST_SIGNATURE_SIZE
     size = float(np.clip(-along / power, low, _MOST_LINEAR)) if start.scalable else 1.0

@@ -10,9 +10,10 @@ from pamrs.diagnosis.search._baseline import refitted, with_inflation
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._examine import Mismatch, examine
 from pamrs.diagnosis.search._readings import Reading, find_misread, reading_errors
-from pamrs.diagnosis.search._wrong_parameters import free_suspects, suspected_values
+from pamrs.diagnosis.search._wrong_parameters import FAR_TOLERANCES, free_suspects, suspected_values
 
 __all__ = [
+    "FAR_TOLERANCES",
     "Attempts",
     "Mismatch",
     "Reading",

@@ -12,6 +12,7 @@ import numpy as np
 
 from pamrs.channels import block_of, channel_of
 from pamrs.diagnosis.evidence import (
+    SAME_STDS,
     BlockLikelihood,
     FittedHypothesis,
     Likelihood,
@@ -21,6 +22,7 @@ from pamrs.diagnosis.evidence import (
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
+    LEAST_STEP_SHARE,
     Events,
     Fit,
     Inflation,
@@ -67,16 +69,12 @@ _SEALED_EVALUATIONS = 30  # evaluations of a fit for a rig without a valve, whic
 _POLISH_EVALUATIONS = 10  # evaluations of the last stretch of a fit (decision 22)
 # fits of a set weighted by what it leaves, while correlated variance falls (decision 103)
 _MOST_WEIGHTINGS = 4
-# deviations by which an effect's size may differ between recordings by its own uncertainty
-_SCATTER_STDS = 2.0
-# share of the nominal stable step below which no events are sought: too slow (decision 103)
-_LEAST_STEP_SHARE = 0.2
-_MOST_TURNS = 3  # in which events and the effects beside them are fitted in turn
+_MOST_TURNS = 3  # in which events and the effects with them are fitted in turn
 _LEAST_TURN = 0.8  # share of the sum of squares above which a further turn is not worth it
-_EVALUATIONS_WITH_EVENTS = 6  # evaluations of the fit of persistent effects beside events that stay
-_FIRST_EVALUATIONS = 5  # evaluations of such a fit (decision 13)
-# evaluations of a freed parameter's first fit: is it worth a whole one (decision 25)
-_WRONG_PARAMETERS_FIRST_EVALUATIONS = 6
+_FIRST_EVALUATIONS = 5  # evaluations of a first fit of a set (decision 13)
+# evaluations of a freed parameter's first fit: is it worth a whole one (decision 25); and of a
+# refit of persistent effects with events that stay
+_SHORT_EVALUATIONS = 6
 
 
 Found = TypeVar("Found")
@@ -167,10 +165,10 @@ class Attempts:
     def fit_events(self, effect: Term, candidate: FittedHypothesis) -> FittedHypothesis | None:
         """Fit an effect with times of its own in every recording, next to a candidate's effects."""
         if effect.id in {e.id for e in candidate.effects}:
-            return None  # it would replace what it is to happen beside
+            return None  # it would replace what it is to happen with
         if candidate.fit.events is not None or candidate.wrong:
-            return None  # what happens beside other events, or wrong values, is not fitted
-        stiffest = _LEAST_STEP_SHARE * self.fit_problem.core.stable_step
+            return None  # what happens with other events, or wrong values, is not fitted
+        stiffest = LEAST_STEP_SHARE * self.fit_problem.core.stable_step
         if core_rig(candidate.fit.rig, self.fit_problem.core).stable_step < stiffest:
             return None  # it would take too long
         return self._attempt(
@@ -246,7 +244,7 @@ class Attempts:
             inflation,
             warm,
             events=fitted.events,
-            evaluations=_EVALUATIONS_WITH_EVENTS,
+            evaluations=_SHORT_EVALUATIONS,
         )
         names = [n for n in fitted.values if effect_of(n) == effect]
         return replace(
@@ -437,7 +435,7 @@ class Attempts:
             self.no_inflation,
             freed=names,
             settled={n: known[n].value for n in others},
-            evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
+            evaluations=_SHORT_EVALUATIONS,
         )
 
     def fit_freed_shortly(self, names: tuple[str, ...]) -> FittedHypothesis | None:
@@ -454,7 +452,7 @@ class Attempts:
                 self.no_inflation,
                 warm=self._fit_alone(names),
                 freed=names,
-                evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
+                evaluations=_SHORT_EVALUATIONS,
             )
             return replace(self.assess((), short), wrong=names)
 
@@ -636,5 +634,5 @@ def _scatter(effects: tuple[Term, ...], problem: Problem, best: Fit) -> float:
             errors.append(1.0 / math.sqrt(den) / size)
     if len(steps) < 2:
         return 0.0
-    beyond = [max(0.0, abs(s) - _SCATTER_STDS * e) for s, e in zip(steps, errors, strict=True)]
+    beyond = [max(0.0, abs(s) - SAME_STDS * e) for s, e in zip(steps, errors, strict=True)]
     return float(max(beyond))

@@ -46,7 +46,7 @@ from pamrs.diagnosis.noise import (
     noise_levels,
     with_sizes,
 )
-from pamrs.diagnosis.prepare import Block, Prepared, Residual
+from pamrs.diagnosis.prepare import CLEARLY_LESS, Block, Prepared, Residual
 from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import UNDECIDED, Hypothesis, effect_of
@@ -54,9 +54,7 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-_MOST_OWN_WEIGHTINGS = 8  # of a refit beside recordings that count by their own
-_LEAST_OTHERS = 2  # recordings that have to agree against one: a single one is fitted by anything
-_DRAGGED = 25.0  # times as large a sum of squares of the others beside one recording as without it
+_DRAGGED = 25.0  # times as large a sum of squares of the others with one recording as without it
 # held-out variance over noise that is a mismatch the fitted hardly show (decision 20)
 _HELD_OUT_RATIO = 2.0
 # variance over that of the noise that the fitted recordings must have for that (decision 20)
@@ -65,8 +63,6 @@ _FITTED_HINT = 1.15
 _MARGINAL_MULTIPLE = 1.35
 # excess variance over that of the noise up to which it may (decisions 20, 22)
 MARGINAL_EXCESS = 0.3
-# share of the error that was taken below which what a hypothesis leaves is clearly less
-_CLEARLY_LESS = 0.5
 
 
 def with_inflation(
@@ -80,8 +76,8 @@ def with_inflation(
     if inflation.largest <= CORRELATED_VARIANCE:
         return first, inflation
     fitted = thorough(problem, nominal, inflation, first)
-    for _ in range(_MOST_OWN_WEIGHTINGS if inflation.apart else 0):
-        # what stands apart had moved the baseline, and that missed the others
+    for _ in range(8 if inflation.apart else 0):  # until no weight falls by much
+        # what is apart had moved the baseline, and that missed the others
         last, inflation = inflation, inflation_of(problem, fitted, noise_level)
         fitted = thorough(problem, nominal, inflation, fitted)
         if all(CORRELATED_VARIANCE * now >= last[name] for name, now in inflation.items()):
@@ -163,7 +159,7 @@ def _as_the_others(problem: Problem, nominal: Rig, inflation: dict[str, float], 
     others = replace(
         problem, recordings=[p for p in problem.recordings if p.recording.name != worst]
     )
-    if len(others.recordings) < _LEAST_OTHERS:
+    if len(others.recordings) < 2:  # a single one is fitted by anything
         return fitted
     alone = thorough(others, nominal, inflation, None)
     of_others, _ = stacked(others, fitted.residuals, inflation)
@@ -241,7 +237,7 @@ class Refit:
         attempts, (usual, sizes) = self.attempts, self.error
         each = [(c, *error_sizes(attempts.fit_problem, c.fit.residuals, usual)) for c in candidates]
         _, sizes_left, _ = max(each, key=lambda one: one[2] - _price(one[0], attempts))
-        if all(sizes_left[name] > _CLEARLY_LESS * size for name, size in sizes.items()):
+        if all(sizes_left[name] > CLEARLY_LESS * size for name, size in sizes.items()):
             return None
         return self.with_error_sizes(
             {name: min(size, sizes_left[name]) for name, size in sizes.items()}

@@ -31,7 +31,7 @@ from pamrs.diagnosis.fit import (
     with_priors,
 )
 from pamrs.diagnosis.noise import NoiseLevel, correlation_time, inflation_of
-from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.prepare import ROUNDING, Block
 from pamrs.effects import (
     CLOSURE_OF,
     CLOSURE_TERMS,
@@ -47,7 +47,6 @@ from pamrs.rig import Rig
 # share of the misfit that it may leave: with less gain it mends the smoothing of drives
 _MOST_MISFIT_SHARE = 0.75
 _MOST_TERMS = 6  # terms that it may have: more is no form that a person reads
-_LEAST_POWER = 1e-6  # share of a term left beside the baseline and the terms before it: rounding
 _EVALUATIONS = 5  # evaluations of the fit of the chosen terms at the most
 # share of the linear estimate from which the fit is tried where the whole of it gains nothing
 _SHRUNK_SHARE = 0.4
@@ -432,9 +431,9 @@ def _select(
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
     crossed = _LeaveOneOut.of(frame, rows, unit)
-    selection = _Selection(candidates, target, wide, _LEAST_POWER)
+    selection = _Selection(candidates, target, wide, ROUNDING)
     for k, candidate in enumerate(candidates):
-        if candidate.name in present and usable[k] and selection.power(k) > _LEAST_POWER:
+        if candidate.name in present and usable[k] and selection.power(k) > ROUNDING:
             selection.take(k)
     order = selection.order
     count, misfit, proof = len(order), selection.misfit, crossed.left_out(order)

@@ -14,7 +14,7 @@ def fit_considered(search: Search) -> list[FittedHypothesis]:
     attempts, fitted = search.attempts, list[FittedHypothesis]()
     for hypothesis in attempts.fit_problem.considered:
         acting = [t for t in hypothesis.terms if any(concerns(t, b) for b in attempts.suspects)]
-        # what may happen at times of its own is looked for beside what lasts
+        # what may happen at times of its own is looked for after what lasts
         effects = sorted(
             (t for t in acting if t.is_effect),
             key=lambda t: (t.info.transient, not t.info.lasting),
@@ -34,7 +34,7 @@ def _add_effect(search: Search, base: FittedHypothesis, effect: Term) -> FittedH
     """Add an effect to a set, from the start of each form that leaves least in a few steps."""
     info, attempts = effect.info, search.attempts
     if base.fit.events is not None:
-        return None  # beside events nothing else is fitted
+        return None  # with events nothing else is fitted
     if not info.lasting:
         return attempts.fit_events(effect if info.own else Term(effect.id), base)
     starts = attempts.starts_of(base)

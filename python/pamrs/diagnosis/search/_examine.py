@@ -51,15 +51,13 @@ from pamrs.diagnosis.search._hypotheses import (
     weigh_to_the_end,
 )
 from pamrs.diagnosis.search._sets import Say, Search
-from pamrs.diagnosis.search._wrong_parameters import free_suspects
+from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, free_suspects
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis
 from pamrs.errors import SimulationError
 from pamrs.findings import MOST_MISSED
 from pamrs.rig import Rig
 
 _FROM_PROBABILITY = 0.3  # probability of unlisted from which a form is looked for (decision 4)
-# share of the mismatch that it may leave, held-out too: no form of anything carries less
-_MOST_SHARE_LEFT = 0.8
 
 
 def examine(
@@ -387,7 +385,7 @@ def _add_form(group: BlockGroup, refit: Refit, say: Say, tell: Say) -> BlockGrou
     group = replace(group, sought=True)
     form = attempts.fit_form(base, suspects, say)
     # what does not carry over to recordings that were held out is no form of anything
-    if form is None or share_left(form, base, suspects) > _MOST_SHARE_LEFT:
+    if form is None or share_left(form, base, suspects) > 1.0 - FURTHER_SHARE:
         return group
     if leading.terms:
         by_name, by_both = (share_left(c, refit.start, suspects) for c in (base, form))

@@ -30,7 +30,7 @@ from pamrs.diagnosis.search._sets import (
     LEAST_GAIN,
     MOST_PAIRED,
     MOST_STARTS,
-    NEAR_PLACE,
+    NEAR_BEST,
     Say,
     Search,
     combine,
@@ -38,17 +38,13 @@ from pamrs.diagnosis.search._sets import (
     log_misfit,
     with_freed_values,
 )
-from pamrs.diagnosis.search._wrong_parameters import free_suspects
+from pamrs.diagnosis.search._wrong_parameters import LEAST_GAIN_SHARE, free_suspects
 from pamrs.effects import CATALOGUE, EFFECTS, Hypothesis, SameData, Term
 
-_LEAST_GAIN_SHARE = 0.08  # share of the largest gain from which an effect is fitted (decision 13)
 # share of an effect's best gain from which another of its starts is fitted (decision 13)
 _NEAR_START = 0.6
-_NEAR_FORM = 0.3  # share of the best gain that fits another form: strong effects are not linear
 _MOST_FORMS = 4  # forms of an effect that are fitted
 _EFFECTS_WITH_STARTS = 3  # effects of which more than one start is fitted (decision 13)
-_REFIT_SHARE = 0.3  # share of the work on some blocks that their refit is
-_SCREEN_SHARE = 0.6  # share that it is up to the fits of what the screen found
 _POLISH_FROM = 0.03  # probability from which a hypothesis is fitted to its end (decision 22)
 
 
@@ -79,7 +75,7 @@ def refit_with_smaller_curve_error(refit: Refit, tell: Say) -> Refit | None:
     if least is None:
         return None
     state = screen_mismatch(least, tell)
-    # a few steps show whether the error is smaller beside an effect, which is then fitted anew
+    # a few steps show whether the error is smaller with an effect, which is then fitted anew
     screened = state.search.screened
     starts = [
         start
@@ -125,7 +121,7 @@ def screen_mismatch(refit: Refit, tell: Say) -> SearchState:
         suspects, key=lambda b: attempts.baseline_excess[b.name].ratio + now[b.name].ratio
     )
     size = f"{now[mismatch.name].systematic:.2g} noise levels"
-    tell(Line(f"after the refit the residual of {mismatch.name} is {size}", _REFIT_SHARE))
+    tell(Line(f"after the refit the residual of {mismatch.name} is {size}", share=0.3))
     acting = _acting_effects(attempts)
     # events of free times would always mend a noise level that was estimated too low
     transient_everywhere = [e for e in acting if not e.at and e.info.transient and not e.info.own]
@@ -268,12 +264,12 @@ def fit_singles(search: Search) -> list[FittedHypothesis]:
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
-    least = max(LEAST_GAIN, _LEAST_GAIN_SHARE * most)
+    least = max(LEAST_GAIN, LEAST_GAIN_SHARE * most)
     worth = _by_family(
         [e for e, scores in ranked.items() if _is_worth_fitting(screened, scores, least)]
     )
     first = ", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8])
-    search.tell(Line(f"screened: {first or 'no effect acts here'}", _SCREEN_SHARE))
+    search.tell(Line(f"screened: {first or 'no effect acts here'}", share=0.6))
 
     if screened.strong:
         chosen, near, short = _shortlist(search, worth, ranked)
@@ -281,7 +277,7 @@ def fit_singles(search: Search) -> list[FittedHypothesis]:
         chosen, near, short = [], {}, {}
         for rank, places in enumerate(worth[: attempts.settings.most_singles]):
             leads = rank < _EFFECTS_WITH_STARTS
-            close = [e for e in places if gains[e] >= NEAR_PLACE * gains[places[0]]]
+            close = [e for e in places if gains[e] >= NEAR_BEST * gains[places[0]]]
             # of the leading effects another place may yet be the one that leaves least
             for effect in close if leads else places[:1]:
                 chosen.append(effect)
@@ -379,7 +375,7 @@ def _shortlist(
     for rank, places in enumerate(first):
         leads = rank < _EFFECTS_WITH_STARTS
         fitted_places = [e for e in places[: None if leads else 1] if most(e) > -math.inf]
-        least = min((short[e][0].misfit for e in fitted_places), default=math.inf) / NEAR_PLACE
+        least = min((short[e][0].misfit for e in fitted_places), default=math.inf) / NEAR_BEST
         for effect in sorted((e for e in fitted_places if short[e][0].misfit <= least), key=most)[
             ::-1
         ]:
@@ -417,7 +413,7 @@ def _near_starts(scores: list[Score]) -> list[Score]:
     A signature is a ranking of forms and no more: that of a strong effect is linear in what is not.
     """
     best = best_of_each_kind(scores)
-    forms = [s for s in best if s.gain > _NEAR_FORM * scores[0].gain]
+    forms = [s for s in best if s.gain > NEAR_BEST * scores[0].gain]
     forms = sorted(forms, key=lambda s: -s.gain)[:_MOST_FORMS]
     alike = [s for s in scores if s.start.kind == scores[0].start.kind]
     near = [s for s in alike if s.gain > _NEAR_START * scores[0].gain]

@@ -25,7 +25,7 @@ from pamrs._arrays import Array
 from pamrs.channels import block_of, channel_of, unit_of
 from pamrs.diagnosis.fit import Fit, Problem, free_baseline, known_parameters, residuals, stacked
 from pamrs.diagnosis.noise import correlation_time, excess, no_inflation, noise_levels
-from pamrs.diagnosis.prepare import Prepared, Residual, implausible
+from pamrs.diagnosis.prepare import NOISE_STDS, Prepared, Residual, implausible
 from pamrs.diagnosis.search._baseline import refitted, thorough
 from pamrs.errors import SimulationError
 from pamrs.findings import ChannelError
@@ -38,17 +38,14 @@ _SUSPECT = 3.0
 # share of that excess which a unit may leave after one step of the parameters to be worth a fit
 _PROMISING = 0.3
 _FITTED = 4  # units that are fitted, the most promising first; others leave more
-# share of the excess that a unit may leave: physics may stand beside it, told from others
+# share of the excess that a unit may leave: physics may be there too, found by others
 _LEFT = 0.05
-# log of a small factor (bar, atmosphere, kgf/cm2), which parameters take up: a free one tells
+# log of a small factor (bar, atmosphere, kgf/cm2), which parameters absorb: a free one tells
 _SMALL_STEP = 0.1
 # standard errors by which such a factor beats none: some ten are tried, in coloured noise
 _CLEAR_STDS = 5.0
-_STDS = 3.0  # standard deviations by which a free factor may be off (one in 370)
 # parts of the step from the unit said within which a free factor is, half being no nearer
 _CLOSER = 0.25
-# part of an offset, and share of a factor, by which it is moved for its derivative
-_FREE_STEP = 0.005
 
 
 OTHERS: Final[dict[str, tuple[str, ...]]] = {
@@ -162,7 +159,7 @@ def find_misread(problem: Problem, nominal: Rig) -> Reading | None:
     small = [r for r in every if not r.offset and r.size < _SMALL_STEP]
     large = _worth_a_fit(problem, nominal, [r for r in every if r not in small])
     # what is no more than a gauge's slope may be off by tells nothing
-    small = [r for r in small if r.size >= _STDS * problem.settings.gauge_error]
+    small = [r for r in small if r.size >= NOISE_STDS * problem.settings.gauge_error]
     if not (small or large):
         return None
     try:
@@ -234,8 +231,8 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     std = math.sqrt(max(1.0, after) / (2.0 * bend))
     step = math.log(reading.factors[0])
     gain = math.exp(step * best)
-    clear = abs(gain - 1.0) >= _STDS * problem.settings.gauge_error
-    if not clear or abs(best - 1.0) > _STDS * std:
+    clear = abs(gain - 1.0) >= NOISE_STDS * problem.settings.gauge_error
+    if not clear or abs(best - 1.0) > NOISE_STDS * std:
         return None
     before = _power(problem, was)
     fits = replace(reading, before=before, after=after, fit=now, was=was)
@@ -289,7 +286,7 @@ def _free_is_listed(problem: Problem, fitted: Fit, reading: Reading) -> bool:
     """True where a free factor (or offset), fitted with the parameters, would be that of the list;
     the problem is that of the reading.
     """
-    step = _FREE_STEP * (abs(reading.offset) or 1.0)
+    step = 0.005 * (abs(reading.offset) or 1.0)  # for the derivative
     factor, offset = (1.0, step) if reading.offset else (1.0 + step, 0.0)
     moved = replace(reading, factors=(factor,) * len(reading.channels), offset=offset)
     pairs = [(p, moved.of(p)) for p in problem.recordings]
@@ -314,7 +311,7 @@ def _free_is_listed(problem: Problem, fitted: Fit, reading: Reading) -> bool:
     # what the model leaves besides is coloured, so as many numbers fewer, and other in each block
     weight = design @ inverse[:, 0]
     coloured = float(np.sum((weight * rows) ** 2)) * correlation_time(rows)
-    spread = _STDS * math.sqrt(max(0.0, inverse[0, 0], coloured))
+    spread = NOISE_STDS * math.sqrt(max(0.0, inverse[0, 0], coloured))
     exact = problem.settings.gauge_error * (abs(reading.offset) or 1.0)
     return away <= max(exact, spread) and away + spread <= _CLOSER * reading.size
 

@@ -13,6 +13,7 @@ import numpy as np
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     LEAST_TEMPERING,
+    SAME_STDS,
     FittedHypothesis,
     Prior,
     log_weight,
@@ -30,16 +31,13 @@ from pamrs.effects import Hypothesis, Term
 # strong mismatch, ten times the noise: linear signatures tell no sizes (decision 13)
 _STRONG_RATIO = 100.0
 LEAST_GAIN = 12.0  # [chi-square] gain by the screen from which an effect is fitted (decision 13)
-# share of the best gain that fits another place: alike blocks half show both (decision 103)
-NEAR_PLACE = 0.3
+# share of the best gain that fits another place, which alike blocks half show (decision 103), or
+# form, as strong effects are not linear
+NEAR_BEST = 0.3
 MOST_STARTS = 2  # starts of an effect that are fitted (decision 13)
 MOST_PAIRED = 2  # single effects that get a partner (decision 13)
 _MOST_PARTNERS = 2  # partners that each of these gets (decision 13)
-# [standard errors] held-out improvement, over pieces, that keeps a further effect
-_FURTHER_ERRORS = 2.0
 _PARTNER_SHARE = 0.01  # least predicted gain of a partner, as a share of the mismatch (decision 13)
-# share left alone for a fit with the best effects: it takes a fifth (decision 103)
-_TELLING_LEFT = 0.8
 # share left by the best persistent effect that asks for transient ones (decision 20)
 _LEFT_FOR_TRANSIENT = 0.08
 _MUCH_LEFT = 0.5  # share of a mismatch from which an effect leaves most of it (decision 20)
@@ -322,7 +320,7 @@ class _Growing:
         least = max(LEAST_GAIN, _PARTNER_SHARE * tangent.power_left)
         likely = [e for e, scores in ranked.items() if scores[0].gain > least]
         best = _one_place_each(likely)[:_MOST_PARTNERS]
-        # what is left in one block may be little beside what another one had: an effect of that
+        # what is left in one block may be little next to what another one had: an effect of that
         # block alone is tested by itself
         for block in _blocks_untouched(base, self.search.start, attempts) if alone else []:
             in_block = [
@@ -335,7 +333,7 @@ class _Growing:
         return [ranked[effect] for effect in best]
 
     def _telling(self, base: FittedHypothesis) -> list[_Partner]:
-        """Partners that take a large share of the mismatch alone.
+        """Partners that take a large share of the mismatch alone (decision 103).
 
         The signature of a strong effect in the presence of another one is linear in what is not;
         where both were fitted, both are known.
@@ -343,7 +341,7 @@ class _Growing:
         telling = [
             c
             for c in self.roots
-            if self.search.share_left(c) < _TELLING_LEFT
+            if self.search.share_left(c) < 1.0 - FURTHER_SHARE
             and c.hypothesis.set.isdisjoint(base.terms)
             and (c.effects or base.effects)
             and not any(e.excluded_by(base.effects) for e in c.effects)
@@ -460,7 +458,7 @@ def _in_another_form(
 
     short = [c for c in two_at_a_time(begin, others) if c is not None]
     best = min(short, key=lambda c: c.misfit, default=None)
-    if best is None or best.misfit > base.misfit / NEAR_PLACE:
+    if best is None or best.misfit > base.misfit / NEAR_BEST:
         return None
     fitted = attempts.fit_together(attempts.starts_of(best), best.fit, base.wrong)
     if fitted is None or log_misfit(fitted) > log_misfit(base) - FORM_SHARE_ALIKE:
@@ -502,7 +500,7 @@ def _predicts_better(further: FittedHypothesis, best: FittedHypothesis, attempts
         return False
     error = math.sqrt(len(taken)) * float(np.std(taken, ddof=1))
     gained = float(sum(taken))
-    return gained > _FURTHER_ERRORS * error and gained > FURTHER_SHARE * left_before
+    return gained > SAME_STDS * error and gained > FURTHER_SHARE * left_before
 
 
 def far_above_noise(attempts: Attempts, candidate: FittedHypothesis) -> bool:

@@ -31,22 +31,20 @@ from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.rig import Rig
 from pamrs.rig.schema import split_name
 
-# evaluations of the linear model that predicts the gain of freeing a parameter: to its end
-_PREDICTED_GAIN_EVALUATIONS = 50
-# share of what a set leaves that a further effect takes; less is the form of the others
+# share of what a set leaves that a further effect takes, and of a mismatch that a partner or a form
+# without a name takes; less is the form of the others
 FURTHER_SHARE = 0.2
-# [chi-square] linear gain that frees a parameter: twice file_log_odds (decision 25)
-_LEAST_PREDICTED_GAIN = 9.2
 # freed parameters, and pairs of them, that are fitted to their end (decision 25)
 _MOST_FINISHED = 3
-# times the misfit of a freed parameter that leaves noise, for others fitted beside it
+# times the misfit of a freed parameter that leaves noise, for others fitted with it
 _NEAR_MISFIT = 2.0
 _SUSPECTED_TOLERANCES = 1.0  # [tolerances] moved by a value whose freeing is looked at
-# [tolerances] moved by a suspect beside effects, which take a part of what it would do
-_FAR_TOLERANCES = 2.0
-_MOST_FAR = 2  # parameters at their wall that are freed beside the effects that leave least
+# [tolerances] moved by a suspect with effects, which take a part of what it would do
+FAR_TOLERANCES = 2.0
+_MOST_FAR = 2  # parameters at their wall that are freed with the effects that leave least
 _MOST_PAIRS = 2  # pairs of parameters that are fitted (decision 25)
-_PAIR_SHARE = 0.08  # share of the largest predicted gain from which a pair is fitted (decision 25)
+# share of the largest gain from which an effect, or a pair, is fitted (decisions 13, 25)
+LEAST_GAIN_SHARE = 0.08
 # wrong by one mistake: other valve and fittings, load, arm (decision 25)
 _WRONG_TOGETHER = (
     ("chamber.dead_volume", "valve.discharge_area_max"),
@@ -137,8 +135,8 @@ def free_suspects(
     ]
     gains = _worth_a_fit(attempts, baseline, list(dict.fromkeys(suspects)), attempts.no_inflation)
     # the linear model says little of what is far away: each parameter is fitted, whatever its
-    # predicted gain beside others
-    least = _PAIR_SHARE * max(gains.values(), default=0.0)
+    # predicted gain with others
+    least = LEAST_GAIN_SHARE * max(gains.values(), default=0.0)
     pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][
         :_MOST_PAIRS
     ]
@@ -155,7 +153,7 @@ def far_parameters(attempts: Attempts, fitted: Fit) -> list[str]:
     model; the most promising first.
     """
     far: list[tuple[str, ...]] = [
-        (name,) for name, moved in fitted.moved.items() if abs(moved) >= _FAR_TOLERANCES
+        (name,) for name, moved in fitted.moved.items() if abs(moved) >= FAR_TOLERANCES
     ]
     gains = _worth_a_fit(attempts, fitted, far, attempts.inflation_of(fitted))
     return [name for (name,) in gains][:_MOST_FAR]
@@ -171,7 +169,7 @@ def _worth_a_fit(
     return {
         n: gains[n]
         for n in sorted(gains, key=lambda n: -gains[n])
-        if gains[n] > _LEAST_PREDICTED_GAIN
+        if gains[n] > 2.0 * attempts.settings.file_log_odds
     }
 
 
@@ -256,7 +254,11 @@ def _predicted_gain(
 
         limits = (np.maximum(low, -wall), np.minimum(high, wall))
         _, (values, _, _), _ = levenberg_marquardt(
-            evaluate, begin, limits, _PREDICTED_GAIN_EVALUATIONS, 0.0
+            evaluate,
+            begin,
+            limits,
+            evaluations=50,  # to its end: it is linear
+            share=0.0,
         )
         return float(values @ values)
 

@@ -82,7 +82,7 @@ _WORDS: Final[dict[str, str]] = {
     "celsius": "degC", "deg c": "degC", "degrees celsius": "degC", "deg_c": "degC",
     "°c": "degC", "°f": "degF", "fahrenheit": "degF", "grad c": "degC", "deg f": "degF",
 }  # fmt: skip
-#: Written where a unit stands, and no unit of anything: what a converter gives, or shares.
+#: Written where a unit would be, and no unit of anything: what a converter gives, or shares.
 _COUNTS: Final = frozenset(
     ("count", "counts", "raw", "adc", "dac", "lsb", "digit", "digits", "tick", "ticks", "step")
     + ("steps", "inc", "bit", "bits", "a.u.", "a. u.", "arb", "arb. units", "%", "percent")

@@ -51,7 +51,7 @@ def read_mdf(path: Path, form: TextFormat) -> Log:
                     continue
                 signal = file.get(group=number, index=index, ignore_invalidation_bits=True)
                 values = numbers_of(signal.samples)
-                if values is None:  # a table of texts stands behind the numbers
+                if values is None:  # a table of texts comes after the numbers
                     signal = file.get(group=number, index=index, raw=True)
                     values = numbers_of(signal.samples)
                 if values is None or len(values) != len(signal.timestamps):

@@ -61,13 +61,13 @@ _COMMENTS: Final = ("#", "%", "//", "'")
 _UNNAMED: Final = "column "
 _LINES: Final = 400  # in the middle of a table, which tell how it is written
 _HEAD: Final = 5000  # rows above the table, at most
-_BEGUN: Final = 20  # rows of an earlier run that may stand above the headings
+_BEGUN: Final = 20  # rows of an earlier run that may come above the headings
 _MOST_TEXTS: Final = 1000  # different texts of a column that can name pieces
 _MARKS: Final = {".": "points", ",": "commas"}
 _GROUPED_BY_COMMAS = re.compile(r"[-+]?(?:[1-9]\d{0,2}(?:,\d{3})+|\d{1,3})(?:\.\d+)?")
 _THOUSANDS = re.compile(r"[-+]?(\d{1,3}(\.\d{3})+|0)")
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]\d{2,3}(?!\d))")
-#: Keys above a table beside which the time between its samples stands.
+#: Keys above a table next to which the time between its samples is given.
 _SPACING: Final = re.compile(
     r"(?:x[ _]?|horizontal |sampl\w+ |scan )?(?:interval|increment|period|resolution)|sample time|"
     r"delta[ _][xt]|dt|abtast(?:zeit|intervall)",
@@ -83,7 +83,7 @@ class _Headed(NamedTuple):
     kinds: list[str]  # of the cells of most rows, by column
     names: list[str]
     units: list[str]
-    rows: list[list[str]]  # headings and units, as they stand in the file
+    rows: list[list[str]]  # headings and units, as they are in the file
     remarks: list[str]
     spacing: float  # seconds between samples, as a row above says; NaN where none does
 
@@ -417,7 +417,7 @@ def _all_units(cells: list[str]) -> bool:
     said = [cell for cell in cells if cell not in ("", "-", "1", "%")]
     return any(
         2 * sum(understood_unit(cell) is not None for cell in some) > len(some)
-        for some in (said, set(said))  # a label may stand beside each of them
+        for some in (said, set(said))  # a label may be next to each of them
     )
 
 
@@ -526,7 +526,7 @@ def _mark_remark(cells: Sequence[str], mark: str) -> list[str]:
     return [f"{_MARKS[mark]} part thousands, as in {cell!r}" for cell in some[:1]]
 
 
-#: Lines with a time beside the rest: ``10:16:51.123 -> 5.00,152057`` of a serial monitor, and
+#: Lines with a time and the rest: ``10:16:51.123 -> 5.00,152057`` of a serial monitor, and
 #: ``rig,bench=1 u=5.0,p=1.2 1669112211000000000`` of InfluxDB.
 _APART: Final = (
     re.compile(r"\s*(?P<of>)(?P<time>\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?)\s*->\s?(?P<rest>.*)"),
