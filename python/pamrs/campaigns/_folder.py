@@ -329,12 +329,13 @@ def sheet(step: Step, proposal: ProposedRun, commands: Commands) -> str:
     one, rig = proposal.experiment, commands.rig
     safe = ", ".join(f"{k} = {v:g} {unit_of(k)}" for k, v in commands.safe.items())
     heard = [name for name in measurable(rig) if name not in one.commands]
+    what = f"{one.text[:1].upper()}{one.text[1:]}."
     lines = [
         f"# Step {step.number}: {step.name}",
         "",
-        f"**Do.** {one.text[:1].upper()}{one.text[1:]}.",
+        f"**Do.** {what}",
         "",
-        f"**Why.** {step.why}",
+        f"**Why.** {step.why.removeprefix(what).lstrip()}",
         "",
         f"- It takes {step.seconds:.0f} s and about {step.litres:.0f} l of air.",
     ]

@@ -69,7 +69,7 @@ from pamrs.simulation import core_rig, supplies_of
 __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose", "missing_input"]
 
 # factor for effects on a joint whose geometry is marked unknown (decision 12)
-_UNKNOWN_GEOMETRY_PROBABILITY = 0.4
+_UNKNOWN_GEOMETRY_FACTOR = 0.4
 
 
 #: Shares of a diagnosis at which its blocks begin to be judged, and are.
@@ -349,7 +349,7 @@ def _diagnosis_in_units_said(
     )
     unsettled = _unknown_parameters(case.rig) if motion else []
     if unsettled:
-        groups = [_scaled_for_unknown_geometry(g, _UNKNOWN_GEOMETRY_PROBABILITY) for g in groups]
+        groups = [_scaled_for_unknown_geometry(g, _UNKNOWN_GEOMETRY_FACTOR) for g in groups]
     say("putting the answer together", _JUDGED[1])
     judged_names, failed = {block.name for block in fit_problem.blocks}, "its judgement failed"
     unjudged += [Unjudged(b.name, b.covers, failed) for b in every if b.name not in judged_names]
@@ -393,7 +393,7 @@ def _diagnosis_in_units_said(
         warning = (
             f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the "
             f"{what} as an effect would, so the probability of an effect of muscles and what they "
-            f"move is capped at {100 * _UNKNOWN_GEOMETRY_PROBABILITY:.0f} %"
+            f"move is multiplied by {_UNKNOWN_GEOMETRY_FACTOR:g}"
         )
         diagnosis = replace(diagnosis, warnings=[warning, *diagnosis.warnings])
     return diagnosis, fit_problem, unjudged

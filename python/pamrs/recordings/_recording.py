@@ -62,7 +62,7 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
     Parameters
     ----------
     channel : str
-        Its canonical name; commands are only looked at for nothing, sensors for everything.
+        Its canonical name; commands are not examined, sensors for everything.
     values : (n,) array
         SI values in the order of sampling, NaN where there is none.
 

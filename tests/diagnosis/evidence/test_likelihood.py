@@ -37,20 +37,20 @@ def test_the_size_that_made_the_rows_is_the_most_probable() -> None:
 
 
 def test_less_left_is_more_probable() -> None:
-    told = [of_ratio(ratio).most for ratio in (1.0, 1.1, 2.0, 10.0, 1e4, 1e8)]
+    told = [of_ratio(ratio).log_density for ratio in (1.0, 1.1, 2.0, 10.0, 1e4, 1e8)]
     assert told == sorted(told, reverse=True)
 
 
 def test_what_is_expected_of_rows_with_an_error_is_about_what_they_have() -> None:
     for size in (1.0, 30.0):
         found = of_ratio(1.0 + size**2)
-        assert found.expected(size) == pytest.approx(found.most, rel=0.05)
+        assert found.expected(size) == pytest.approx(found.log_density, rel=0.05)
     assert of_ratio(1.0).expected(0.0) == -0.5 * BINS
 
 
 def test_rows_that_nothing_is_known_of_say_nothing() -> None:
     found = _Covariance([], []).likelihood([])
-    assert (found.most, found.count, found.power) == (0.0, 0, 0.0)
+    assert (found.log_density, found.count, found.power) == (0.0, 0, 0.0)
 
 
 def test_recordings_of_other_lengths_are_not_mixed_up() -> None:
@@ -64,4 +64,4 @@ def test_recordings_of_other_lengths_are_not_mixed_up() -> None:
 def test_what_is_not_finite_is_never_probable() -> None:
     rows = np.ones(BINS)
     rows[3] = np.nan
-    assert _Covariance([TIMES], [np.empty((BINS, 0))]).likelihood([rows]).most == -np.inf
+    assert _Covariance([TIMES], [np.empty((BINS, 0))]).likelihood([rows]).log_density == -np.inf

@@ -159,7 +159,7 @@ def made_up(term: str, left: float, places: int) -> FittedHypothesis:
     left_of = Excess(left, left**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
     kept = {b.name: left_of for b in blocks_of(PAIR) if b.kind == "chamber"}
     found = likelihoods.made_up(rig, term, kept, values, std=spread, covariance=covariance)
-    return replace(found, places=math.log(places))
+    return replace(found, log_places=math.log(places))
 
 
 def weighed(*found: FittedHypothesis) -> dict[str, float]:

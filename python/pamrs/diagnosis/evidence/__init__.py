@@ -1,7 +1,9 @@
 """Hypotheses, what speaks for each, and the verdict of each group of blocks.
 
 A probability is made in two files: `_prior` (odds before any data) and `_posterior` (likelihood
-times prior, for hypotheses of one group of blocks and of all groups). Public: `FittedHypothesis`,
+times prior, for hypotheses of one group of blocks and of all groups, in the order that it states).
+It changes once more where `model` takes an answer out that its errors contradict (`put_aside`), and
+where the geometry of a joint is marked unknown (`diagnosis/__init__`). Public: `FittedHypothesis`,
 `BlockGroup` (hypotheses); `BlockLikelihood`, `Likelihood` (how probable recordings are); `Prior`,
 `probability_cap`, `loss_of_file`, `is_unlikely`, `parameters_at_wall` (odds); `posterior`,
 `posterior_where_noise`, `log_weight`, `possible_gain`, `drop_undetermined`, `put_aside`,

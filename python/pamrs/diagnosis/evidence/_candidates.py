@@ -45,7 +45,7 @@ class FittedHypothesis:
         Gain in chi-square that the screen predicted for a single effect.
     wrong : tuple of str
         Dotted names of the parameters that were freed from their tolerance.
-    places : float
+    log_places : float
         Logarithm of how many places its effects could have been said to act at: by so much each is
         less probable before any data.
     likelihood : callable
@@ -60,7 +60,7 @@ class FittedHypothesis:
     scattered: Callable[[], float] = field(default=float, repr=False)
     gain: float = 0.0
     wrong: tuple[str, ...] = ()
-    places: float = 0.0
+    log_places: float = 0.0
     likelihood: Callable[[], Mapping[str, BlockLikelihood]] = field(default=dict, repr=False)
 
     @property
@@ -98,7 +98,7 @@ class BlockGroup:
     Attributes
     ----------
     blocks : list of Block
-        Gas blocks (supply, chamber) or the arm.
+        Gas blocks (supply, chamber), the arm, or a part of these where names explain parts.
     nominal, baseline : dict of str to Excess
         Excess by block before and after the refit, on fitted recordings.
     candidates : list of FittedHypothesis

@@ -56,7 +56,7 @@ class BlockLikelihood:
     error_power: float = 1.0
 
     @property
-    def most(self) -> float:
+    def log_density(self) -> float:
         """Logarithm of the density under the most probable size."""
         return float(self.by_size.max())
 

@@ -51,7 +51,7 @@ _COUNTED = 1e-6  # probability from which a hypothesis of one group is put with 
 
 
 def posterior(
-    candidates: list[FittedHypothesis], suspects: list[Block], prior: Prior
+    candidates: list[FittedHypothesis], compared: list[Block], prior: Prior
 ) -> dict[Hypothesis, float]:
     """Probabilities of the hypotheses and of ``unlisted`` (docs/decisions/0014).
 
@@ -70,7 +70,7 @@ def posterior(
     ----------
     candidates : list of FittedHypothesis
         The baseline first, then every hypothesis.
-    suspects : list of Block
+    compared : list of Block
         Blocks by which they are compared.
     prior : Prior
         Odds before any data, and the largest probability of all names together.
@@ -78,10 +78,10 @@ def posterior(
     start = candidates[0]
     walls = prior.settings.most_tolerances
     named = [c for c in candidates if c.terms and not is_absent(c, walls)]
-    tempering = _tempering([start, *named], suspects)
-    scores = {c.hypothesis: log_weight(c, start, suspects, prior, tempering) for c in named}
-    scores[UNDECIDED] = log_weight(start, start, suspects, prior, tempering)
-    scores[UNLISTED] = _log_weight_unlisted(start, suspects, tempering)
+    tempering = _tempering([start, *named], compared)
+    scores = {c.hypothesis: log_weight(c, start, compared, prior, tempering) for c in named}
+    scores[UNDECIDED] = log_weight(start, start, compared, prior, tempering)
+    scores[UNLISTED] = _log_weight_unlisted(start, compared, tempering)
     top = max(scores.values())
     weights = {h: math.exp(max(-60.0, score - top)) for h, score in scores.items()}
     rare = {c.hypothesis: prior.rarity(c) for c in named}
@@ -92,23 +92,23 @@ def posterior(
     for candidate in named:
         key = candidate.hypothesis
         lost = rare[key] + prior.settings.further_price * (len(candidate.terms) - 1)
-        form = _odds_of_form(_share_taken(candidate, start, suspects))
+        form = _odds_of_form(_share_taken(candidate, start, compared))
         weights[key] += missed * alike[key] * form * math.exp(-lost)
     total = sum(weights.values())
     out = {h: weight / total for h, weight in weights.items()}
     for hypothesis in [h for h in out if h.terms]:
         # what no name may have falls to physics without a name
-        out[UNLISTED] += (1.0 - prior.most) * out[hypothesis]
-        out[hypothesis] *= prior.most
+        out[UNLISTED] += (1.0 - prior.cap) * out[hypothesis]
+        out[hypothesis] *= prior.cap
     return out
 
 
 def _share_taken(
-    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block]
+    candidate: FittedHypothesis, baseline: FittedHypothesis, compared: list[Block]
 ) -> float:
     """Share of the power of the baseline's error that a hypothesis removes, 0 to 1."""
     before, after = (
-        sum(hypothesis.likelihood()[b.name].size ** 2 for b in suspects)
+        sum(hypothesis.likelihood()[b.name].size ** 2 for b in compared)
         for hypothesis in (baseline, candidate)
     )
     return min(1.0, max(0.0, 1.0 - after / before)) if before > 0.0 else 0.0
@@ -125,12 +125,12 @@ def _odds_of_form(taken: float) -> float:
     return taken * max(1.0, density)
 
 
-def _tempering(candidates: list[FittedHypothesis], suspects: list[Block]) -> float:
+def _tempering(candidates: list[FittedHypothesis], compared: list[Block]) -> float:
     """Share of the log evidence that counts (a power posterior): larger, the nearer the best
     hypothesis is to noise. Noise is independent from bin to bin; what no hypothesis explains is
     not.
     """
-    powers = [[c.likelihood()[block.name].power for block in suspects] for c in candidates]
+    powers = [[c.likelihood()[block.name].power for block in compared] for c in candidates]
     least_power = min(max(powers_of, default=1.0) for powers_of in powers)
     return min(_MOST_TEMPERING, max(LEAST_TEMPERING, _NOISE_TEMPERING / max(least_power, 1e-9)))
 
@@ -138,14 +138,14 @@ def _tempering(candidates: list[FittedHypothesis], suspects: list[Block]) -> flo
 def log_weight(
     candidate: FittedHypothesis,
     baseline: FittedHypothesis,
-    suspects: list[Block],
+    compared: list[Block],
     prior: Prior,
     tempering: float,
 ) -> float:
     """Logarithm of a hypothesis's weight, up to a constant: the share `tempering` of its evidence
     in some blocks, less its price, its moved parameters and its rare values.
     """
-    evidence = _evidence(candidate, baseline, suspects, tempering) - _strain(candidate)
+    evidence = _evidence(candidate, baseline, compared, tempering) - _strain(candidate)
     return evidence - prior.loss(candidate)
 
 
@@ -155,13 +155,13 @@ def _strain(candidate: FittedHypothesis) -> float:
 
 
 def _evidence(
-    candidate: FittedHypothesis, baseline: FittedHypothesis, suspects: list[Block], tempering: float
+    candidate: FittedHypothesis, baseline: FittedHypothesis, compared: list[Block], tempering: float
 ) -> float:
     """Tempered log evidence of a hypothesis in some blocks, at the best size of the leftover error;
     an error above a tenth of what the hypothesis explains costs more, the larger it is.
     """
     total = 0.0
-    for name in (block.name for block in suspects):
+    for name in (block.name for block in compared):
         now, before = candidate.likelihood()[name], baseline.likelihood()[name]
         taken = max(0.0, before.size**2 - now.size**2)
         expected = _LEAST_ERROR + _FORM_ERROR * math.sqrt(taken)
@@ -173,23 +173,23 @@ def _evidence(
 
 
 def _log_weight_unlisted(
-    baseline: FittedHypothesis, suspects: list[Block], tempering: float
+    baseline: FittedHypothesis, compared: list[Block], tempering: float
 ) -> float:
     """Log weight of physics without a name, as if a right name explained all."""
     total = 0.0
-    for likelihood in (baseline.likelihood()[block.name] for block in suspects):
+    for likelihood in (baseline.likelihood()[block.name] for block in compared):
         error = _LEAST_ERROR + _FORM_ERROR * likelihood.size
-        total += max(likelihood.most, likelihood.expected(error))
+        total += max(likelihood.log_density, likelihood.expected(error))
     return tempering * total - UNLISTED_PRICE - _strain(baseline)
 
 
-def possible_gain(candidate: FittedHypothesis, suspects: list[Block]) -> float:
+def possible_gain(candidate: FittedHypothesis, compared: list[Block]) -> float:
     """Largest rise of a candidate's log weight in a search (of the least tempering) by an addition
     that leaves nothing but noise.
     """
-    likelihoods = [candidate.likelihood()[block.name] for block in suspects]
+    likelihoods = [candidate.likelihood()[block.name] for block in compared]
     return LEAST_TEMPERING * sum(
-        max(0.0, likelihood.expected(0.0) - likelihood.most) for likelihood in likelihoods
+        max(0.0, likelihood.expected(0.0) - likelihood.log_density) for likelihood in likelihoods
     )
 
 
@@ -218,7 +218,7 @@ def posterior_where_noise(
 
 def _plausibility(candidate: FittedHypothesis) -> float:
     """Logarithm of how probable a hypothesis makes the recordings, and its own values."""
-    evidence = sum(likelihood.most for likelihood in candidate.likelihood().values())
+    evidence = sum(likelihood.log_density for likelihood in candidate.likelihood().values())
     return evidence - 0.5 * (candidate.fit.strain + candidate.fit.start_strain)
 
 
@@ -324,7 +324,7 @@ def joint_posteriors(
             weight *= _odds_shared(term, holders, prior)
         for weights, (hypothesis, _) in zip(joint, choice, strict=True):
             weights[hypothesis] = weights.get(hypothesis, 0.0) + weight
-    return [normalised(_with_capped_names(weights, prior.most)) for weights in joint]
+    return [normalised(_with_capped_names(weights, prior.cap)) for weights in joint]
 
 
 def _with_capped_names(weights: dict[Hypothesis, float], most: float) -> dict[Hypothesis, float]:

@@ -41,15 +41,15 @@ _UNSEEN_PRICE = 6.5
 _MOST_RANGE_PRICE = 4.0
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
 SHARED_ODDS = 6.0
-# `UNDECIDED` of a group of which only noise is left is divided by these numbers (decision 4), the
-# rest to parameters where these moved, else to none: of none where parameters moved, of parameters
-# where they did not
+# shares of `UNDECIDED` (decision 4): of the less likely one of none and parameters, by whether
+# parameters moved; the other one has the rest
 _NOISE_ONLY_OTHER = 0.03
-# of unlisted: in 24 of 171 such groups physics was missing that was too small to be seen
+# share of unlisted: in 24 of 171 such groups physics was missing that was too small to be seen
 _NOISE_ONLY_UNLISTED = 0.14
-# of parameters where their values are unlikely: these explain all, at a price the owner would mind
+# share of parameters where their values are unlikely: these explain all, at a price the owner would
+# mind; unlisted has the rest
 _UNLIKELY_PARAMETERS = 0.75
-# [tolerances] moved to its wall (fit.most_tolerances), which is suspect (decision 25)
+# [tolerances] moved to its wall (the setting most_tolerances), which is suspect (decision 25)
 WALL_TOLERANCES = 2.9
 # [noise levels] left in a group below which nothing has no name: both such groups of 40 read cases
 # lacked nothing (decision 4)
@@ -63,7 +63,7 @@ class Prior:
 
     Attributes
     ----------
-    most : float
+    cap : float
         Largest probability of all names together.
     seconds : float
         Length of the longest recording that was fitted [s].
@@ -71,7 +71,7 @@ class Prior:
         Prices.
     """
 
-    most: float
+    cap: float
     seconds: float
     settings: DiagnosisSettings
 
@@ -82,7 +82,7 @@ class Prior:
     def price(self, candidate: FittedHypothesis) -> float:
         """Log odds paid for names, parameters, events, possible places, and wrong values."""
         total = sum(self._own_price(candidate, term) for term in candidate.terms)
-        total += self.settings.further_price * len(candidate.terms) + candidate.places
+        total += self.settings.further_price * len(candidate.terms) + candidate.log_places
         events = candidate.fit.events
         happened = 0 if events is None else sum(len(v) for v in events.values.values())
         return total + self.settings.parameter_price * happened
@@ -109,7 +109,7 @@ class Prior:
             return paid
         own = [name for name in candidate.fit.effect_values if effect_of(name) == term]
         rare = sum(loss_by_value(candidate, name) for name in own)
-        return paid + rare + candidate.places / max(1, len(candidate.effects))
+        return paid + rare + candidate.log_places / max(1, len(candidate.effects))
 
 
 def loss_of_file(candidate: FittedHypothesis, settings: DiagnosisSettings) -> float:

@@ -52,9 +52,10 @@ FIT_BIN_TIME = 0.02  # [s] bins of residuals for fits: faster than any effect of
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 Key = tuple[str, str]
+"""Block and recording."""
 Residuals = dict[Key, Residual]
 Stages = dict[str, Residuals]
-"""Block and recording."""
+"""Residuals by stage: ``before``, ``refit``, ``after``."""
 
 LOGARITHMIC = frozenset(
     f"{effect.id}.{parameter.name}"

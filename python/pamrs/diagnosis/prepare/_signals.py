@@ -93,7 +93,7 @@ class Prepared:
     unsettled : dict of str to int
         First samples of a channel that are not judged, since they show where something that nobody
         measured began.
-    unheard : dict of str to (n,) bool array
+    after_holes : dict of str to (n,) bool array
         Rows of a channel that are not judged, since they show when a command changed that was not
         recorded as it did.
     temperatures : dict of str to float

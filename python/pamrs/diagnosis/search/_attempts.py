@@ -304,7 +304,7 @@ class Attempts:
             fit_excess,
             gap,
             scattered=cache(partial(_scatter, effects, self.fit_problem, fitted)),
-            places=sum(math.log(len(self.terms_of(e.id))) for e in effects),
+            log_places=sum(math.log(len(self.terms_of(e.id))) for e in effects),
             likelihood=self.likelihood_of(fitted.residuals, held_out_residuals),
         )
 
