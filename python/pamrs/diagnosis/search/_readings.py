@@ -23,8 +23,23 @@ import numpy as np
 
 from pamrs._arrays import Array
 from pamrs.channels import block_of, channel_of, unit_of
-from pamrs.diagnosis.fit import Fit, Problem, free_baseline, known_parameters, residuals, stacked
-from pamrs.diagnosis.noise import correlation_time, excess, no_inflation, noise_levels
+from pamrs.diagnosis.fit import (
+    Fit,
+    Key,
+    Problem,
+    free_baseline,
+    known_parameters,
+    residuals,
+    stacked,
+)
+from pamrs.diagnosis.noise import (
+    NoiseLevel,
+    correlation_time,
+    excess,
+    inflation_of,
+    no_inflation,
+    noise_levels,
+)
 from pamrs.diagnosis.prepare import NOISE_STDS, Prepared, Residual, implausible
 from pamrs.diagnosis.search._baseline import refitted, thorough
 from pamrs.errors import SimulationError
@@ -210,17 +225,24 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
 
     Parameters inside their tolerances absorb most of what it misses, and what it takes is less than
     noise from bin to bin: asked is the sum of squares, priors included, as the parameters follow
-    the factor. Where physics is missing too it is not reported.
+    the factor, each block's residual weighted by its autocorrelation. Where physics is missing too
+    it is not reported.
     """
     reread = reading.read(problem)
     beyond = replace(reading, factors=tuple(factor**2 for factor in reading.factors)).read(problem)
     try:
         now = thorough(reread, nominal, no_inflation(problem.blocks), was)
-        after = _power(reread, now)
-        least = _CLEAR_STDS**2 * max(1.0, after)
-        if 2.0 * (was.cost - now.cost) < least or not _is_noise(reread, now):
+        before, after = _power(problem, was), _power(reread, now)
+        levels, least = noise_levels(reread, core_rig(now.rig)), 0.5 * _CLEAR_STDS**2
+        if was.cost - now.cost < least * max(1.0, after) or not _is_noise(reread, now, levels):
             return None
-        far = thorough(beyond, nominal, no_inflation(problem.blocks), now)
+        inflation = inflation_of(reread, now, levels)
+        was, now, far = (
+            thorough(read, nominal, inflation, start)
+            for read, start in ((problem, was), (reread, now), (beyond, now))
+        )
+        if was.cost - now.cost < least:
+            return None
     except SimulationError:
         return None
     # a parabola through none, the factor and its square, in steps of the factor
@@ -228,20 +250,18 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     if bend <= 0.0:
         return None
     best = 0.5 + (was.cost - now.cost) / bend
-    std = math.sqrt(max(1.0, after) / (2.0 * bend))
+    std = math.sqrt(0.5 / bend)
     step = math.log(reading.factors[0])
     gain = math.exp(step * best)
     clear = abs(gain - 1.0) >= NOISE_STDS * problem.settings.gauge_error
     if not clear or abs(best - 1.0) > NOISE_STDS * std:
         return None
-    before = _power(problem, was)
     fits = replace(reading, before=before, after=after, fit=now, was=was)
     return replace(fits, gain=gain, std=gain * abs(step) * std)
 
 
-def _is_noise(problem: Problem, fitted: Fit) -> bool:
+def _is_noise(problem: Problem, fitted: Fit, levels: Mapping[Key, NoiseLevel]) -> bool:
     """True where a fit leaves no more than noise in any block."""
-    levels = noise_levels(problem, core_rig(fitted.rig))
     excesses = [
         excess(b, problem.recordings, fitted.residuals, levels, problem.settings)
         for b in problem.blocks
