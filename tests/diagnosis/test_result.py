@@ -26,8 +26,7 @@ from pamrs.findings import (
     NextExperiment,
     PairExperiment,
 )
-from pamrs.report import render_html
-from pamrs.report import text as words
+from pamrs.report import render_html, words
 from tests.diagnosis import synthetic
 from tests.tables import rows_of
 

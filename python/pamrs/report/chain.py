@@ -18,7 +18,8 @@ from pamrs.effects import EFFECTS
 from pamrs.findings import BlockMismatch, Findings
 from pamrs.report.figures import COLOURS
 from pamrs.report.page import render_page
-from pamrs.report.text import format_number, label, left_in, miss
+from pamrs.report.sentences import left_in, miss, unsure_names
+from pamrs.report.words import format_number, label
 from pamrs.rig import Rig
 
 COLUMN, BOX, LINE, PAD, GAP = 186.0, 134.0, 17.0, 14.0, 34.0
@@ -258,9 +259,8 @@ def _middle(rows: list[float], otherwise: float) -> float:
 
 def _mark(parts: dict[str, _DrawnBlock], diagnosis: Findings) -> None:
     """Mark the blocks in which something was found, with what was found."""
-    answer = diagnosis.answer
-    open_ = {n for p in answer.parts for n in p.names if not p.sure or answer.missed}
-    for effect in (e for e in diagnosis.effects if e.term in answer.named):
+    open_ = unsure_names(diagnosis)
+    for effect in (e for e in diagnosis.effects if e.term in diagnosis.answer.named):
         kind = EFFECTS[effect.id].block if effect.id in EFFECTS else ""
         doubt = "perhaps " if effect.term in open_ else ""
         for part in _at(parts, kind, effect.at):

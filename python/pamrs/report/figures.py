@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from pamrs._arrays import Array
 from pamrs._views import decimate
 from pamrs.findings import YOURS, Curves, Findings, MissingInput, Trace
-from pamrs.report.text import (
+from pamrs.report.words import (
     display_unit,
     format_number,
     hypothesis_label,
@@ -397,15 +397,17 @@ HYPOTHESES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#c79a00", "#56b4e9")
 """Colours of hypotheses, the leading one first (Okabe and Ito)."""
 
 
-def separating_panels(own: Curves) -> list[Panel]:
+def separating_panels(own: Curves | None) -> list[Panel]:
     """The next experiment as every hypothesis predicts it, and what each cannot explain of the
     leading one's outcome.
 
     Parameters
     ----------
-    own : Curves
-        Those of the next experiment.
+    own : Curves or None
+        Those of the next experiment; None where it was not simulated.
     """
+    if own is None:
+        return []
     colours = dict(zip(own.predicted, HYPOTHESES, strict=False))
     found = []
     for time, values, what, noise in (
