@@ -32,7 +32,7 @@ PACKAGES = {
     "fit": 2936,
     "library": 71,
     "recordings": 5019,
-    "report": 2007,
+    "report": 1936,
     "rig": 2227,
     "rigs": 141,
     "simulation": 1095,

@@ -211,9 +211,8 @@ def test_a_size_is_told_as_a_bench_has_it() -> None:
             "laminar_share": (share, None, "1"),
         }
         parameters = {n: EffectParameterFound(*own) for n, own in values.items()}
-        ((_, told),) = sentences.bench_value(
-            EffectFound("leak_muscle", form=form, parameters=parameters)
-        )
+        effect = EffectFound("leak_muscle", form=form, parameters=parameters)
+        ((_, _, told), _) = sentences.effect_values(effect)
         return told
 
     # sonic flow at 4.013 bar absolute; and (p^2 - pa^2)/500 kPa of a porous wall, both times C

@@ -13,7 +13,7 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from pamrs._losses import Losses
-from pamrs.findings import HEALTHY, YOURS, BlockMismatch, Findings, Trace
+from pamrs.findings import HEALTHY, YOURS, BlockMismatch, Findings
 from pamrs.report import figures, sentences, words
 from pamrs.report.chain import chain_svg
 from pamrs.report.page import render_page
@@ -42,8 +42,7 @@ def _missed(diagnosis: Findings, block: BlockMismatch) -> list[str]:
     texts = []
     for stage in ("refit", "after"):
         missed = sentences.miss(diagnosis, block.channel, stage)
-        left = sentences.left_in(diagnosis, block.block, stage)
-        note = f", {sentences.LEFT[left][1]}" if left in sentences.LEFT else ""
+        note = sentences.LEFT[sentences.left_in(diagnosis, block.block, stage) or "more"][1]
         texts.append(f"{typeset(str(missed))}{note}" if missed else "–")
     return texts
 
@@ -141,24 +140,23 @@ def _budget(diagnosis: Findings) -> list[tuple[str, list[dict[str, str]]]]:
     def at(share: float) -> float:
         return 100.0 * (min(high, max(low, share)) - low) / (high - low)
 
+    def bar(first: float, last: float) -> str:
+        return f"left:{at(first):.2f}%;width:{at(last) - at(first):.2f}%"
+
     found = []
     for block, own in blocks.items():
-        rows = []
-        left = sentences.left_in(diagnosis, block)
-        for name, term in own:
-            ends = sorted((at(0.0), at(term.share)))
-            first, last = at(term.interval[0]), at(term.interval[1])
-            rest = term.kind == "unexplained"
-            rows.append(
-                {
-                    "name": sentences.LEFT[left][0] if rest and left in sentences.LEFT else name,
-                    "kind": term.kind,
-                    "text": words.format_share(term.share),
-                    "interval": words.format_interval(term.interval),
-                    "bar": f"left:{ends[0]:.2f}%;width:{ends[1] - ends[0]:.2f}%",
-                    "whisker": f"left:{first:.2f}%;width:{last - first:.2f}%",
-                }
-            )
+        left = sentences.LEFT[sentences.left_in(diagnosis, block) or "more"][0]
+        rows = [
+            {
+                "name": (left if term.kind == "unexplained" else "") or name,
+                "kind": term.kind,
+                "text": words.format_share(term.share),
+                "interval": words.format_interval(term.interval),
+                "bar": bar(*sorted((0.0, term.share))),
+                "whisker": bar(*term.interval),
+            }
+            for name, term in own
+        ]
         found.append((spoken_name(block), rows))
     return found
 
@@ -210,22 +208,19 @@ def _curves(panels: list[figures.Panel], prefix: str) -> Markup | None:
 def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
     """One fitted and one held-out recording with their figure, and how many are not shown."""
     telling = figures.telling_trace(diagnosis)
-    groups: dict[tuple[str, str], list[Trace]] = {}
-    for trace in diagnosis.traces:
-        groups.setdefault((trace.role, trace.recording), []).append(trace)
-    keys = list(groups)
-    if telling is not None:
-        keys.sort(key=lambda k: k != (telling.role, telling.recording))
-    held = [k for k in keys if k[0] == "held_out"]
-    chosen = [k for k in keys if k not in held][:1] + held[:1]
+    first = telling and (telling.role, telling.recording)
+    groups = words.grouped(((t.role, t.recording), t) for t in diagnosis.traces)
+    keys = sorted(groups, key=lambda key: key != first)
+    held = [key for key in keys if key[0] == "held_out"]
+    chosen = [key for key in keys if key not in held][:1] + held[:1]
     shown = []
-    for i, key in enumerate(chosen):
-        traces = sorted(groups[key], key=lambda t: t.channel != diagnosis.where.channel)[:TRACES]
+    for i, (role, name) in enumerate(chosen):
+        traces = sorted(groups[role, name], key=lambda t: t.channel != diagnosis.where.channel)
         shown.append(
             {
-                "name": key[1],
-                "role": "held out" if key[0] == "held_out" else "used for the fit",
-                "curves": _curves(figures.trace_panels(diagnosis, traces), f"rec{i}"),
+                "name": name,
+                "role": "held out" if role == "held_out" else "used for the fit",
+                "curves": _curves(figures.trace_panels(diagnosis, traces[:TRACES]), f"rec{i}"),
             }
         )
     return shown, len(groups) - len(shown)

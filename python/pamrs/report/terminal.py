@@ -67,16 +67,14 @@ def _probabilities(diagnosis: Findings) -> list[str]:
     """Bars of each group of blocks with a mismatch."""
     lines = []
     for part, chances in sentences.bars(diagnosis):
-        rows = sentences.ranked_probabilities(chances, 5)
-        if rows:
-            lines.append("")
-        if rows and len(diagnosis.judged) > 1 and part:
-            lines.append(f"{blocks_label(part.group)}:")
-        names = [hypothesis_label(name) for name, _ in rows]
-        width = min(max(38, *map(len, names)), 56) if names else 38
+        ranked = sentences.ranked_probabilities(chances, 5)
+        rows = [(hypothesis_label(name), p) for name, p in ranked]
+        width = min(max([38, *(len(name) for name, _ in rows)]), 56)
+        heads = [f"{blocks_label(part.group)}:"] if part and len(diagnosis.judged) > 1 else []
+        lines += ["", *heads] if rows else []
         lines += [
             f"{name:<{width}.{width}} {format_probability(p):>7}  {'#' * round(30 * p)}".rstrip()
-            for place, (name, (_, p)) in enumerate(zip(names, rows, strict=True))
+            for place, (name, p) in enumerate(rows)
             if place == 0 or p >= 0.005
         ]
     return lines

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any, TypeGuard
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeGuard, TypeVar
 
 from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS, Hypothesis, Term
@@ -23,6 +23,9 @@ from pamrs.findings import (
 )
 from pamrs.rig.schema import BLOCKS
 from pamrs.units import with_unit
+
+_Key = TypeVar("_Key")
+_Value = TypeVar("_Value")
 
 TELLING = 0.25
 """Distance below nothing or above everything within which a share is written as a number."""
@@ -55,6 +58,14 @@ _TERMS = {
     "unexplained": "unexplained",
 }
 """Terms of a budget that name no effect and no value, by their kind."""
+
+
+def grouped(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, list[_Value]]:
+    """Values by what they share, in the order in which it first comes."""
+    found: dict[_Key, list[_Value]] = {}
+    for key, value in pairs:
+        found.setdefault(key, []).append(value)
+    return found
 
 
 def label(identifier: str) -> str:
@@ -353,10 +364,8 @@ def error_cells(
 
 def span95(entry: EffectParameterFound) -> tuple[float, float] | None:
     """95 % interval of a parameter entry: its ``interval`` if given, else value ± 1.96 std."""
-    interval = entry.interval
-    if interval is not None and len(interval) == 2 and all(is_number(v) for v in interval):
-        return float(interval[0]), float(interval[1])
-    value, std = entry.value, entry.std
-    if is_number(value) and is_number(std):
-        return float(value) - 1.96 * float(std), float(value) + 1.96 * float(std)
-    return None
+    every = [tuple(entry.interval or ())]
+    if is_number(entry.value) and is_number(entry.std):
+        every.append((entry.value - 1.96 * entry.std, entry.value + 1.96 * entry.std))
+    known = (own for own in every if len(own) == 2 and all(map(is_number, own)))
+    return next(((float(low), float(high)) for low, high in known), None)

@@ -8,14 +8,12 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis, Term
-from pamrs.findings import HEALTHY, BlockVerdict, Findings, Missed, Part
+from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis, Term, effect_of
+from pamrs.findings import HEALTHY, BlockVerdict, EffectFound, Findings, Part
 from pamrs.report.sentences._entries import (
     DOWN_TO_NOISE,
-    bench_value,
     down_to,
-    held_words,
-    judged_place,
+    effect_values,
     law_sentence,
     miss,
     missed_place,
@@ -32,6 +30,7 @@ from pamrs.report.words import (
     format_number,
     format_probability,
     format_share,
+    grouped,
     hypothesis_label,
     is_number,
     label,
@@ -64,6 +63,21 @@ _BADGES = {
 named."""
 _MORE = ("not settled: what is missing was not found", "not settled: more is missing")
 """Verdicts where the final model still misses too much: without a name, and with one."""
+_HEALTHY_HEADS = {
+    NONE: "The model of the {} may be complete; not ruled out",
+    PARAMETERS: "Values may explain what the {} misses; not ruled out",
+}
+_HEADS = {
+    "file": ("The rig file is wrong about the {}", "The rig file may be wrong about the {}"),
+    "both": ("The {} differs from model and rig file", "The {} may differ from model and rig file"),
+    "effects": ("The model of the {} leaves out {}", "The model of the {} may leave out {}"),
+    "something": (
+        "Something acts in the {} that the model leaves out",
+        "Something may act in the {} that the model leaves out",
+    ),
+}
+"""Words on what answers share, sure and in doubt: values of the rig file, values and effects,
+effects of one kind, or nothing."""
 _TOGETHER = ", alone or with others"
 
 
@@ -182,17 +196,27 @@ def _together(diagnosis: Findings, parts: Sequence[Part]) -> str:
     """
     if len(parts) < 2 or any(p.group.wrong_parameters or not p.sure for p in parts):
         return ""
-    named: dict[str, list[str]] = {}
-    for part in parts:
-        name = set_label(part.names) if part.names else "an effect outside the catalogue"
-        named.setdefault(name, []).append(_with_chance(f"in the {place(part)}", part))
+    named = grouped(
+        (
+            set_label(part.names) if part.names else "an effect outside the catalogue",
+            _with_chance(f"in the {place(part)}", part),
+        )
+        for part in parts
+    )
     verb = "may leave" if diagnosis.answer.missed else "leaves"
     return f"The model {verb} out {listed([f'{n} {listed(own)}' for n, own in named.items()])}"
 
 
 def healthy_sentence(diagnosis: Findings) -> str:
-    """Sentence for a result where no answer that is left has anything missing."""
-    where = judged_place(diagnosis) + held_words(diagnosis)
+    """Sentence for a result where no answer that is left has anything missing: in the judged blocks
+    where some were not, and in addition to the effects that the model had before.
+    """
+    judged = " and ".join(map(blocks_label, diagnosis.judged if diagnosis.not_judged else ()))
+    ids = [term.id for term in diagnosis.budget if term.kind == "held"]
+    ids += [effect.id for name in diagnosis.parameters if (effect := effect_of(name))]
+    held = " and ".join(f"the {label(i)}" for i in dict.fromkeys(ids) if i in EFFECTS)
+    where = f" in the {judged}" * bool(judged)
+    where += f" in addition to {held} that the model holds" * bool(held)
     how = down_to(diagnosis)
     if diagnosis.answer.verdict == "parameters":
         by = "values inside their tolerances explain the difference"
@@ -246,23 +270,19 @@ def _with_chance(text: str, chance: Part | float) -> str:
 
 def _head(where: str, left: Sequence[Hypothesis], *, doubt: bool) -> str:
     """Words on what the answers that are left of a group share."""
-    if left[0] == NONE:
-        return f"The model of the {where} may be complete; not ruled out"
-    if left[0] == PARAMETERS:
-        return f"Values may explain what the {where} misses; not ruled out"
+    if left[0] in _HEALTHY_HEADS:
+        return _HEALTHY_HEADS[left[0]].format(where)
     # what is still missed says nothing against names that are open anyway
     doubt = NONE in left or PARAMETERS in left or (doubt and len(left) == 1)
     values = [term.is_value for h in left for term in h.terms]
-    if any(values):
-        if all(values) and UNLISTED not in left:
-            return f"The rig file {'may be' if doubt else 'is'} wrong about the {where}"
-        return f"The {where} {'may differ' if doubt else 'differs'} from model and rig file"
-    kinds = [{EFFECTS[t.id].shares for t in h.terms} for h in left if h.terms]
+    kinds = [{EFFECTS[t.id].shares for t in h.terms if t.is_effect} for h in left if h.terms]
     shared = sorted(set.intersection(*kinds) - {""}) if kinds else []
-    if shared and UNLISTED not in left:
-        return f"The model of the {where} {'may leave' if doubt else 'leaves'} out {shared[0]}"
-    acts = "may act" if doubt and left[0] != UNLISTED else "acts"
-    return f"Something {acts} in the {where} that the model leaves out"
+    kind = "effects"
+    if any(values):
+        kind = "file" if all(values) and UNLISTED not in left else "both"
+    elif not shared or UNLISTED in left:
+        kind, doubt = "something", doubt and left[0] != UNLISTED
+    return _HEADS[kind][doubt].format(where, *shared)
 
 
 def chance_words(part: Part) -> str:
@@ -293,19 +313,20 @@ def unsure_names(diagnosis: Findings) -> set[str]:
 def unsettled_sentence(diagnosis: Findings) -> str:
     """Sentence on why an answer is not settled; empty where it is."""
     answer = diagnosis.answer
-    open_ = [part for part in answer.parts if len(part.left) > 1]
-    reasons = []
-    if answer.missed:
-        reasons.append(f"{with_article(answer.model)} misses more than noise and its error explain")
-    for part in open_:
-        where = f" in the {place(part)}" if len(answer.parts) > 1 else ""
-        reasons.append(f"these recordings cannot tell {told_apart(part)}{where}")
-    for part in answer.parts:
-        if part not in open_ and not part.sure:
-            reasons.append(
-                f"{set_label(part.words)} has {chance_words(part)}, "
-                f"and more than {diagnosis.settled} is needed"
-            )
+    several = len(answer.parts) > 1
+    missing = f"{with_article(answer.model)} misses more than noise and its error explain"
+    reasons = [missing] * bool(answer.missed)
+    reasons += [
+        f"these recordings cannot tell {told_apart(part)}" + f" in the {place(part)}" * several
+        for part in answer.parts
+        if len(part.left) > 1
+    ]
+    reasons += [
+        f"{set_label(part.words)} has {chance_words(part)}, and more than {diagnosis.settled} is "
+        "needed"
+        for part in answer.parts
+        if len(part.left) == 1 and not part.sure
+    ]
     return f"It is not settled: {'; '.join(reasons)}." if reasons else ""
 
 
@@ -351,37 +372,51 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
             (f"{m.likely}, not {m.said}", ", ".join(map(spoken_name, m.channels)))
             for m in diagnosis.misread
         ]
-    answer, found = diagnosis.answer, list[tuple[str, str]]()
-    still = [_still(own) for own in answer.missed[:1]]
-    found += [] if answer.named else still
-    parts = answer.parts[:2]
-    for part in parts[:1] if parts and parts[0].group.probabilities else ():
-        at = f" in {blocks_label(part.group)}" if len(part.group.blocks) > 1 else ""
-        chance = format_probability(_missing(part))
-        found.append((place(part), f"something is missing or wrong{at}: probability {chance}"))
+    answer, parts = diagnosis.answer, diagnosis.answer.parts[:2]
     several = len(answer.parts or answer.quiet) > 1
-    for part in parts or ([] if answer.missed else answer.quiet):
-        at = f" in the {_shown_place(diagnosis, part)}" * several
-        found.append((answer_label(part.words), f"probability {chance_words(part)}{at}"))
+    still = [
+        (
+            sized(own.size, own.unit),
+            f"{spoken_name(own.channel)} still missed {missed_place(own)} "
+            f"({format_number(own.noises, 2)} × noise)",
+        )
+        for own in answer.missed[:1]
+    ]
+    located = [
+        (
+            place(part),
+            "something is missing or wrong"
+            + f" in {blocks_label(part.group)}" * (len(part.group.blocks) > 1)
+            + f": probability {format_probability(_missing(part))}",
+        )
+        for part in parts[:1]
+        if part.group.probabilities
+    ]
+    leading = [
+        (
+            answer_label(part.words),
+            f"probability {chance_words(part)}"
+            + f" in the {_shown_place(diagnosis, part)}" * several,
+        )
+        for part in parts or ([] if answer.missed else answer.quiet)
+    ]
     named = [e for e in diagnosis.effects if e.term in answer.named]
-    for effect in sorted(named, key=lambda e: bool(parts) and e.term not in parts[0].names):
-        sizes = bench_value(effect)[:1]
-        found += [(value, f"{label(effect.term)}: {name}") for name, value in sizes]
+    named.sort(key=lambda e: bool(parts) and e.term not in parts[0].names)
+    sizes = [size for effect in named for size in _bench_facts(effect)[:1]]
     channel = next(filter(None, map(_channel, parts)), None)
     channel = channel or diagnosis.where.channel or worst_channel(diagnosis)
     last = None if answer.missed else miss(diagnosis, channel, "after")
     if channel and last:
-        model = with_article(answer.model)
-        what = f"{spoken_name(channel)} missed by {model} ({last.size})"
-        found.append((f"{format_number(last.noises, 2)} × noise", what))
-    return found + (still if answer.named else [])
+        what = f"{spoken_name(channel)} missed by {with_article(answer.model)} ({last.size})"
+        sizes.append((f"{format_number(last.noises, 2)} × noise", what))
+    found = [*located, *leading, *sizes]
+    return [*found, *still] if answer.named else [*still, *found]
 
 
-def _still(own: Missed) -> tuple[str, str]:
-    """A channel that the final model still misses: by how much, and where."""
-    times = format_number(own.noises, 2)
-    what = f"{spoken_name(own.channel)} still missed {missed_place(own)} ({times} × noise)"
-    return sized(own.size, own.unit), what
+def _bench_facts(effect: EffectFound) -> list[tuple[str, str]]:
+    """Sizes of an effect on the bench that have an interval, each with its name."""
+    rows = effect_values(effect)
+    return [(text, f"{label(effect.term)}: {label(name)}") for name, own, text in rows if own.std]
 
 
 def _missing(part: Part) -> float:

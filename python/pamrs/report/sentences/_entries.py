@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from pamrs.channels import unit_of
-from pamrs.effects import EFFECTS, effect_of, find_parameter
+from pamrs.effects import EFFECTS, find_parameter
 from pamrs.findings import (
     MENDED,
     MOST_MISSED,
@@ -23,6 +23,7 @@ from pamrs.findings import (
     EffectFound,
     EffectParameterFound,
     Findings,
+    FreeRunError,
     Limit,
     Missed,
     OtherLaw,
@@ -42,6 +43,7 @@ from pamrs.report.words import (
     format_probability,
     format_share,
     format_uncertain,
+    grouped,
     hypothesis_label,
     in_one_unit,
     is_number,
@@ -67,25 +69,22 @@ BUDGET_NOTE = (
 )
 """Explanation of the shares of a budget."""
 LEFT = {
-    "noise": ("only noise is left", "noise only"),
-    "error": ("what is left is inside the usual error of the model", "inside its usual error"),
+    "noise": ("only noise is left", ", noise only", "fits to the noise"),
+    "error": (
+        "what is left is inside the usual error of the model",
+        ", inside its usual error",
+        "usual error: ",
+    ),
+    "more": ("", "", "misses "),
 }
-"""Rest of a block, where it is nothing unexplained: as a sentence, and as a note."""
+"""Rest of a block by its kind: as a sentence where it is nothing unexplained, as a note behind its
+size, and in a picture."""
 DOWN_TO_NOISE = "down to the noise level"
 """Words for a model that leaves only noise of its recordings."""
 
 _INSTRUCTION = 40  # characters that two texts share at least before they begin with one instruction
 _CLEARLY_WORSE = 1.1  # ratio of two errors that is no accident of the noise
 _MOST_LOGS = 3  # recordings of which a summary says what was left out
-_Key = TypeVar("_Key", bound=Hashable)
-
-
-def grouped(pairs: Iterable[tuple[_Key, str]]) -> dict[_Key, list[str]]:
-    """Names by what they share, in the order in which it first comes."""
-    found: dict[_Key, list[str]] = {}
-    for key, name in pairs:
-        found.setdefault(key, []).append(name)
-    return found
 
 
 def _by_reason(reasons: Iterable[tuple[str, str]], between: str) -> str:
@@ -362,21 +361,6 @@ def not_judged_words(diagnosis: Findings) -> list[str]:
     return [f"not judged: {_by_reason(blocks, ' and ')}"] if blocks else []
 
 
-def judged_place(diagnosis: Findings) -> str:
-    """Words on the judged blocks, in which nothing is missing; empty where all were judged."""
-    if not diagnosis.not_judged:
-        return ""
-    return f" in the {' and '.join(map(blocks_label, diagnosis.judged))}"
-
-
-def held_words(diagnosis: Findings) -> str:
-    """The effects that the model had before: `` in addition to the leak that the model holds``."""
-    ids = [term.id for term in diagnosis.budget if term.kind == "held"]
-    ids += [effect.id for name in diagnosis.parameters if (effect := effect_of(name))]
-    held = [f"the {label(i)}" for i in dict.fromkeys(ids) if i in EFFECTS]
-    return f" in addition to {' and '.join(held)} that the model holds" if held else ""
-
-
 def limit_sizes(limit: Limit, units: Units | None = None) -> list[str]:
     """Typical size of an effect and those from which it is seen and told apart, in the units of a
     bench or those of a rig file; empty where there is none.
@@ -433,14 +417,29 @@ def effect_values(
     effect: EffectFound, *, own_units: bool = False
 ) -> list[tuple[str, EffectParameterFound, str]]:
     """The parameters of an effect that the recordings determine: name, entry, and the value as a
-    bench has it, a choice in words; with ``own_units`` on the bench alone, and in handy units.
+    bench has it with its 95 % interval (``5.2 (4.9 to 5.5) l/min at 3 bar``), a choice in words;
+    with ``own_units`` in those alone that parameters have there.
     """
-    bench, vague = dict(bench_value(effect, own_units=own_units)), undetermined(effect)
+    vague = undetermined(effect)
     return [
-        (name, own, bench.get(label(name)) or value_words(effect, name))
+        (name, own, _on_bench(effect, name, own_units=own_units) or value_words(effect, name))
         for name, own in effect.parameters.items()
         if name not in vague
     ]
+
+
+def _on_bench(effect: EffectFound, name: str, *, own_units: bool) -> str:
+    """Value of a parameter with its interval in the unit of a bench; empty of a choice."""
+    info, own = EFFECTS.get(effect.id), effect.parameters[name]
+    bench = info.on_bench(name, effect.form) if info else None
+    if not own.std or (own_units and not bench):
+        return ""
+    mixed = effect.parameters.get(bench.mixed_by) if bench else None
+    unit, factor = bench_unit(
+        f"{effect.id}.{name}", own.unit, abs(own.value), effect.form, mixed.value if mixed else 0.0
+    )
+    value, *bounds = (format_number(v * factor, 2) for v in (own.value, *(span95(own) or ())))
+    return with_unit(f"{value} ({' to '.join(bounds)})" if bounds else value, unit)
 
 
 def value_words(effect: EffectFound, name: str) -> str:
@@ -458,32 +457,6 @@ def value_words(effect: EffectFound, name: str) -> str:
         return "" if unit == found.unit else f"{format_number(factor * found.value)} {unit}"
     meanings: dict[str, str] = dict(re.findall(r"(\d)(?: \([^)]*\))?: ([^,]+)", own.meaning))
     return meanings.get(f"{found.value:.0f}", "")
-
-
-def bench_value(effect: EffectFound, *, own_units: bool = False) -> list[tuple[str, str]]:
-    """The parameters of an effect that the recordings determine, as a bench has them: name, and
-    value with its 95 % interval and unit (``5.2 (4.9 to 5.5) l/min at 3 bar``); with ``own_units``
-    those alone that have a unit of their own there.
-    """
-    info, vague = EFFECTS.get(effect.id), undetermined(effect)
-    return [
-        (label(name), _on_bench(effect, name, own))
-        for name, own in effect.parameters.items()
-        if name not in vague
-        and own.std
-        and not (own_units and not (info and info.on_bench(name, effect.form)))
-    ]
-
-
-def _on_bench(effect: EffectFound, name: str, own: EffectParameterFound) -> str:
-    info = EFFECTS.get(effect.id)
-    bench = info.on_bench(name, effect.form) if info else None
-    mixed = effect.parameters.get(bench.mixed_by) if bench else None
-    unit, factor = bench_unit(
-        f"{effect.id}.{name}", own.unit, abs(own.value), effect.form, mixed.value if mixed else 0.0
-    )
-    value, *bounds = (format_number(v * factor, 2) for v in (own.value, *(span95(own) or ())))
-    return with_unit(f"{value} ({' to '.join(bounds)})" if bounds else value, unit)
 
 
 def budgets(diagnosis: Findings) -> dict[str, list[BudgetTerm]]:
@@ -535,7 +508,7 @@ def budget_sentence(terms: Sequence[BudgetTerm], left: str = "") -> str:
     if not is_telling(last.share):
         share = "more is unexplained than with the nominal model"
     left = left or ("more" if last.noises > 0.0 else "noise")
-    return "; ".join([*shares, LEFT.get(left, (share,))[0]]) + "."
+    return "; ".join([*shares, LEFT[left][0] or share]) + "."
 
 
 def reported_terms(terms: Sequence[BudgetTerm]) -> list[tuple[str, BudgetTerm]]:
@@ -563,9 +536,7 @@ def pair_texts(diagnosis: Findings) -> list[tuple[PairExperiment, str, str]]:
     own = diagnosis.next_experiment
     before = {own.text: "The same experiment."}
     found = []
-    for pair in own.pairs:
-        if pair.text == own.text:
-            continue
+    for pair in (pair for pair in own.pairs if pair.text != own.text):
         shared, first = max(
             ((_shared(pair.text, text), short) for text, short in before.items()),
             key=lambda both: both[0],
@@ -681,3 +652,18 @@ def free_run_sentences(diagnosis: Findings) -> list[str]:
             errors.append(f"{channel} {' to '.join(sizes)} {unit}")
         texts.append(f"Whole rig from its commands alone, {run.recording}: {'; '.join(errors)}")
     return list(map(plain, texts))
+
+
+def free_run_words(error: FreeRunError, factor: float, final: str) -> str:
+    """Words behind the title of a curve on the errors of your model and of the final one."""
+    before, after = (format_number(v * factor, 2) for v in (error.before, error.after))
+    return f": missed by {before}, {final.split()[0]} {after}"
+
+
+def refit_words(diagnosis: Findings, block: str, channel: str | None) -> tuple[str, str]:
+    """Kind of what the refitted model leaves in a block, and how far that is from the noise."""
+    left, missed = left_in(diagnosis, block, "refit"), miss(diagnosis, channel, "refit")
+    times = format_number(missed.noises, 2) if missed else ""
+    left = "noise" if times == "1.0" else left
+    size = f"{LEFT[left][2]}{times} × noise" if times and left in LEFT else ""
+    return left, LEFT["noise"][2] if left == "noise" else size

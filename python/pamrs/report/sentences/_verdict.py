@@ -50,25 +50,31 @@ def verdict(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) 
 
     ``forms`` say what a mismatch without a name is a function of, if that was ``sought``.
     """
-    answer, first = diagnosis.answer, diagnosis.answer.parts[:1]
+    answer = diagnosis.answer
     without = [p for p in answer.parts if p.group.verdict == "unlisted"]
-    still = [f"{missed_sentence(diagnosis, len(answer.missed))}."] * bool(answer.missed)
-    main = [] if first or answer.missed else [_healthy(diagnosis)]
-    main += [_effects(diagnosis, case), _mistaken(diagnosis)]
-    unexplained = _without_name(diagnosis, without) if without else ""
-    if first and first == without[:1]:  # what has no name leads
-        main, unexplained = [unexplained, *main], ""
     healthy = [p for p in answer.parts if not p.names and p not in without]
-    main += [
-        f"The {place(p)} may lack nothing (probability {format_probability(p.probability)})."
-        for p in healthy
+    unexplained = _without_name(diagnosis, without) if without else ""
+    leads = answer.parts[:1] == without[:1]  # what has no name
+    main = [
+        "" if answer.parts or answer.missed else _healthy(diagnosis),
+        unexplained if leads else "",
+        _effects(diagnosis, case),
+        _mistaken(diagnosis),
+        *(
+            f"The {place(p)} may lack nothing (probability {format_probability(p.probability)})."
+            for p in healthy
+        ),
+        diagnosis.where.text if healthy and answer.parts[:1] == healthy[:1] else "",
     ]
-    main += [diagnosis.where.text] if first and first == healthy[:1] else []
+    still = [f"{missed_sentence(diagnosis, len(answer.missed))}."] * bool(answer.missed)
     main = [*main, *still] if answer.named else [*still, *main]
-    main.append(unsettled_sentence(diagnosis))
-    form = _form(diagnosis, case, forms, sought=sought) if without else ""
-    ends = [f"{capital(words)}." for words in not_judged_words(diagnosis)]
-    return "\n\n".join(filter(None, [_joined(*main), unexplained, form, *ends]))
+    paragraphs = [
+        _joined(*main, unsettled_sentence(diagnosis)),
+        "" if leads else unexplained,
+        _form(diagnosis, case, forms, sought=sought) if without else "",
+        *(f"{capital(words)}." for words in not_judged_words(diagnosis)),
+    ]
+    return "\n\n".join(filter(None, paragraphs))
 
 
 def _joined(*sentences: str) -> str:
@@ -123,16 +129,13 @@ def _mistaken(diagnosis: Findings) -> str:
     # the error is that of the model with everything that was found
     addition = " with all that was found" if len(diagnosis.answer.named) > 1 else ""
     for wrong in found:
-        mended = {
-            channel: e for channel, e in wrong.held_out.items() if e.after < _MENDED * e.refit
-        }
-        errors = []
-        for channel, e in (mended or wrong.held_out).items():
-            now, was = sized_alike([e.after, e.refit], unit_of(channel))
-            errors.append(
-                f"the {spoken_name(channel)} is then missed{addition} by {now} instead of {was}, "
-                "which values inside the tolerances leave"
-            )
+        mended = {c: e for c, e in wrong.held_out.items() if e.after < _MENDED * e.refit}
+        errors = [
+            f"the {spoken_name(channel)} is then missed{addition} by "
+            f"{' instead of '.join(sized_alike([e.after, e.refit], unit_of(channel)))}, "
+            "which values inside the tolerances leave"
+            for channel, e in (mended or wrong.held_out).items()
+        ]
         sentences.append(
             f"{sentence_of(wrong)} (probability {name_chance(diagnosis, wrong.name)}, "
             f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {diagnosis.proof} "
