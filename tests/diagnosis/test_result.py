@@ -26,8 +26,8 @@ from pamrs.findings import (
     NextExperiment,
     PairExperiment,
 )
-from pamrs.report import render_html
-from pamrs.report import text as words
+from pamrs.report import render_html, words
+from pamrs.report.sentences._answer import unsettled_sentence
 from tests.diagnosis import synthetic
 from tests.tables import rows_of
 
@@ -179,7 +179,7 @@ def test_it_is_settled_from_the_probability_that_the_settings_say() -> None:
 def test_what_has_no_name_is_not_settled_however_sure_it_is_that_something_acts() -> None:
     found = _judged("unlisted", {"unlisted": 0.97, "muscle_creep": 0.03})
     assert (found.answer.settled, found.answer.why) == (False, "name")
-    assert words.unsettled_sentence(found) == (
+    assert unsettled_sentence(found) == (
         "It is not settled: what is missing in the arm has no name."
     )
 

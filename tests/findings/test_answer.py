@@ -21,8 +21,8 @@ from pamrs.findings import (
     case_verdict,
     left_of,
 )
-from pamrs.report import story
-from pamrs.report.html import case_badge
+from pamrs.report import sentences
+from pamrs.report.sentences import case_badge
 from tests.diagnosis import synthetic
 
 NAMES = {"effects": ["muscle_creep"], "parameters": [], "none": [], "unlisted": []}
@@ -121,7 +121,7 @@ def test_an_answer_is_settled_or_says_why_not(
     # the name comes first, then what is missed with it
     assert told.headline.startswith("The model of the arm ")
     assert ("The mended model still misses arm channel by " in told.headline) == (why == "missed")
-    assert ("may leave out" in story.title(told)) == bool(why)
+    assert ("may leave out" in sentences.title(told)) == bool(why)
 
 
 def test_sets_that_are_left_leave_it_open() -> None:

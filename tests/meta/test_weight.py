@@ -21,18 +21,18 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1109,
-    "campaigns": 1149,
+    "campaigns": 1150,
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11155,
+    "diagnosis": 11149,
     "effects": 404,
     "experiments": 1052,
-    "findings": 947,
+    "findings": 949,
     "fit": 2936,
     "library": 71,
     "recordings": 5019,
-    "report": 2070,
+    "report": 1947,
     "rig": 2227,
     "rigs": 141,
     "simulation": 1095,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27841,
+    "tests": 27865,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1233,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37400
+MOST = 37274
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -32,7 +32,7 @@ from pamrs.findings import (
     WrongParameter,
     left_of,
 )
-from pamrs.report.verdict import verdict
+from pamrs.report.sentences import verdict
 from tests.diagnosis.asked import SETTINGS
 from tests.diagnosis.evidence.test_verdicts import RIG, group
 

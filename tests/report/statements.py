@@ -15,10 +15,12 @@ from typing import Any, NamedTuple
 import pamrs
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.findings import HEALTHY
-from pamrs.report import render_html, story
-from pamrs.report import text as words
+from pamrs.report import render_html, sentences, words
 
-_OPEN = r"\bmay\b|not ruled out|still misses|that the model leaves out|\) or | or \d+ more"
+_OPEN = (
+    r"\bmay\b|not ruled out|still misses|that the model leaves out|\) or | or \d+ more"
+    r"|no effect of the catalogue|outside the catalogue"
+)
 """Words of a sentence that is not sure."""
 _NUMBER = r"([<>]? ?\d\.\d\d)"
 _BADGES = {
@@ -28,7 +30,6 @@ _BADGES = {
     "parameters or physics, not settled": ("parameters", False),
     "missing physics named": ("effects", True),
     "missing physics, the name is not settled": ("effects", False),
-    "missing physics, not in the catalogue": ("unlisted", True),
     "missing physics, no name": ("unlisted", False),
     "a value of the rig file is wrong": ("parameters", True),
     "a value of the rig file may be wrong": ("parameters", False),
@@ -38,7 +39,7 @@ _BADGES = {
 }
 """Verdict and whether it is settled, of each badge; empty where it does not say."""
 _LEFT = {
-    "noise": ("only noise is left", "left, no more than noise", "noise only", "fits to the noise"),
+    "noise": ("only noise is left", "noise only", "fits to the noise"),
     "error": ("inside the usual error", "inside its usual error", "usual error: "),
 }
 """Words for what is left in a block; it is more where none of them is said."""
@@ -121,7 +122,7 @@ def _of_headlines(found: Diagnosis, page: str, summary: str) -> list[Statement]:
     if found.misread:
         return told
     missed = {m.channel for m in found.answer.missed}
-    for source, text in (("headline", found.headline), ("title", story.title(found))):
+    for source, text in (("headline", found.headline), ("title", sentences.title(found))):
         for own in found.faulty:  # said before
             text = text.removeprefix(f"{own.text}. ")
         sure = re.search(_OPEN, text.replace("alone or with others", "")) is None
@@ -145,11 +146,12 @@ def _of_headlines(found: Diagnosis, page: str, summary: str) -> list[Statement]:
 def _of_chances(found: Diagnosis, page: str) -> list[Statement]:
     """Probabilities in bars, facts, headline and text, by name and place."""
     told = [
-        Statement(f"probability of {row.name}", row.chance, "rivals") for row in story.rivals(found)
+        Statement(f"probability of {row.name}", row.chance, "rivals")
+        for row in sentences.rivals(found)
     ]
     rows = re.findall(r'<tr><th>([^<]*)</th><td class="track">.*?num">([^<]*)</td>', page)
     told += [Statement(f"probability of {name}", p, "page") for name, p in rows if "%" not in p]
-    for name, what in story.facts(found):
+    for name, what in sentences.facts(found):
         if chance := re.match(
             rf"probability {_NUMBER}(, alone or with others)?( in the .*)?$", what
         ):
@@ -185,7 +187,7 @@ def _left_said(text: str) -> str:
 def _of_blocks(found: Diagnosis, page: str, summary: str) -> list[Statement]:
     """What is left in each block, and where the mismatch is."""
     told = []
-    for block, sentence in words.budget_sentences(found):
+    for block, sentence in sentences.budget_sentences(found):
         about = f"left in {block}"
         told.append(Statement(about, _left_said(sentence), "budget"))
         begin = f"Budget of the {words.spoken_name(block)}: "
@@ -258,7 +260,7 @@ def _of_next(found: Diagnosis, page: str, summary: str) -> list[Statement]:
     told.append(Statement("the terminal has the next experiment", whole, "terminal"))
     told.append(Statement("the terminal has the next experiment", True, "next experiment"))
     block = str(own.excitation.get("block", ""))
-    left = {m.block: words.left_in(found, m.block) for b in found.judged for m in b.mismatch}
+    left = {m.block: sentences.left_in(found, m.block) for b in found.judged for m in b.mismatch}
     part = found.answer.part_of(block)
     # an open name is a question by itself, and so is a missing one
     asked = part is not None and (len(part.left) > 1 or part.group.verdict == "unlisted")
@@ -274,7 +276,8 @@ def _of_text(found: Diagnosis) -> list[Statement]:
         return []
     told = [Statement("settled", "It is not settled" not in found.text, "text")]
     if "may lack nothing" not in found.text:
-        told.append(Statement("missing", "show no missing physics" not in found.text, "text"))
+        healthy = found.text.startswith(("Nothing is missing", "No physics is missing"))
+        told.append(Statement("missing", not healthy, "text"))
     if found.answer.missed:
         told.append(Statement("missing", "still misses" in found.text, "text"))
     return told

@@ -29,8 +29,7 @@ from pamrs.findings import (
     MissingRecording,
     fields_from,
 )
-from pamrs.report import figures, render_html, story
-from pamrs.report import text as words
+from pamrs.report import figures, render_html, sentences
 from tests.tables import rows_of
 
 
@@ -163,7 +162,7 @@ def test_little_is_to_be_read_before_details(changes) -> None:
     seen = visible(render_html(found))
     assert 20 < len(seen) <= 150
     assert found.next_experiment.instruction in " ".join(seen)  # whole
-    assert len(story.title(found).split()) <= story.LONGEST
+    assert len(sentences.title(found).split()) <= sentences.LONGEST
 
 
 @pytest.mark.parametrize(
@@ -171,7 +170,7 @@ def test_little_is_to_be_read_before_details(changes) -> None:
     rows_of(__file__, "the_title_says_what_all_that_is_left_shares"),
 )
 def test_the_title_says_what_all_that_is_left_shares(changes, told: str) -> None:
-    assert story.title(synthetic.diagnosis(**changes)) == told
+    assert sentences.title(synthetic.diagnosis(**changes)) == told
 
 
 def test_curves_are_data_that_a_script_redraws() -> None:
@@ -212,9 +211,8 @@ def test_a_size_is_told_as_a_bench_has_it() -> None:
             "laminar_share": (share, None, "1"),
         }
         parameters = {n: EffectParameterFound(*own) for n, own in values.items()}
-        ((_, told),) = story.bench_value(
-            EffectFound("leak_muscle", form=form, parameters=parameters)
-        )
+        effect = EffectFound("leak_muscle", form=form, parameters=parameters)
+        ((_, _, told), _) = sentences.effect_values(effect)
         return told
 
     # sonic flow at 4.013 bar absolute; and (p^2 - pa^2)/500 kPa of a porous wall, both times C
@@ -283,7 +281,7 @@ def test_the_final_model_is_called_what_it_is(page: str) -> None:
     told = [found.answer.model for found in (named, refitted, nothing)]
     assert told == ["mended model", "refitted model", "your model"]
     for found, columns in ((named, 4), (refitted, 3), (nothing, 3)):
-        heads = [*words.shown_stages(found).values()]
+        heads = [*sentences.shown_stages(found).values()]
         assert len({*heads}) == len(heads) == columns
         assert all(head in found.summary() for head in heads)
     assert "<th>mended model</th>" in render_html(named)
@@ -295,10 +293,12 @@ def test_a_refit_that_spoils_held_out_recordings_is_said() -> None:
         "joint_angle": ChannelError(noise=0.001, before=0.03, refit=0.05, after=0.05),
         "muscle_pressure": ChannelError(noise=500.0, before=900.0, refit=990.0, after=600.0),
     }
-    told = words.worse_sentence(table)
+    told = sentences.worse_sentence(table)
     assert "joint angle worse here" in told
     assert "muscle pressure" not in told  # within two noise levels it is chance
-    assert words.worse_sentence({"joint_angle": replace(table["joint_angle"], refit=0.03)}) == ""
+    assert (
+        sentences.worse_sentence({"joint_angle": replace(table["joint_angle"], refit=0.03)}) == ""
+    )
 
 
 def test_a_whisker_is_drawn_where_its_text_says() -> None:
@@ -325,6 +325,6 @@ def test_a_whisker_is_drawn_where_its_text_says() -> None:
     for own, (bar, whisker) in zip(terms, rows, strict=True):
         assert ends(bar) == pytest.approx(sorted((at(0.0), at(own.share))), abs=0.02)
         assert ends(whisker) == pytest.approx([at(v) for v in own.interval], abs=0.02)
-    sentence = words.budget_sentence(terms)
+    sentence = sentences.budget_sentence(terms)
     assert "muscle creep 120 % (30 to 250)" in sentence
     assert "under 1 % unexplained" in sentence

@@ -17,8 +17,7 @@ from pamrs.findings import (
     MismatchStages,
     Unexplained,
 )
-from pamrs.report import render_html, story
-from pamrs.report import text as words
+from pamrs.report import render_html, sentences
 from tests.diagnosis import synthetic
 
 KEYS = ("noise", "before", "refit", "after")
@@ -71,7 +70,7 @@ def test_one_cause_that_two_groups_see_is_told_once() -> None:
     assert found.headline == (
         "The model leaves out encoder error in the arm (0.98) and in the chamber (0.93)"
     )
-    assert words.name_chance(found, "encoder_error") == "0.98 in the arm, 0.93 in the chamber"
+    assert sentences.name_chance(found, "encoder_error") == "0.98 in the arm, 0.93 in the chamber"
     # another name is told by itself
     other = group("arm", "joint_angle", 0.9, effects=["muscle_creep"])
     told = "encoder error in the chamber (0.93) and muscle creep in the arm (0.90)"
@@ -83,12 +82,12 @@ def test_a_settled_name_leads_the_title_whatever_else_is_located() -> None:
     creep = group("arm", "joint_angle", 0.4, effects=["muscle_creep"])
     left = replace(creep, effects=[], ambiguity=[["unlisted"], ["muscle_creep"]])
     found = seen(sure, left, verdict="effects")
-    assert story.title(found) == (
+    assert sentences.title(found) == (
         "The model of the chamber leaves out a leak: muscle leak (0.93); something else may act "
         "in the arm"
     )
-    assert story.facts(found)[0][0] == "chamber"
-    names = [row.name for row in story.rivals(found)]
+    assert sentences.facts(found)[0][0] == "chamber"
+    names = [row.name for row in sentences.rivals(found)]
     assert names[0] == "muscle leak in the chamber"
     assert any(name.endswith("in the arm") for name in names)
 
@@ -96,27 +95,27 @@ def test_a_settled_name_leads_the_title_whatever_else_is_located() -> None:
 def test_noise_that_is_left_is_not_called_unexplained(tmp_path: Any) -> None:
     terms = [term("parameters", 0.99, 0.1), term("unexplained", 0.01, 0.029)]
     found = seen(group("arm", "joint_angle", 0.9, effects=["muscle_creep"]), budget=terms)
-    ((block, told),) = words.budget_sentences(found)
-    assert (block, words.left_in(found, "arm")) == ("arm", "noise")
+    ((block, told),) = sentences.budget_sentences(found)
+    assert (block, sentences.left_in(found, "arm")) == ("arm", "noise")
     assert told == "parameters inside tolerance 99 % (99 to 99); only noise is left."
-    assert "unexplained" not in words.budget_sentences(found)[0][1]
+    assert "unexplained" not in sentences.budget_sentences(found)[0][1]
     # where it is more than noise, or a result does not say, the size is told
-    assert "1 % unexplained" in words.budget_sentence(terms)
-    inside = words.budget_sentence(terms, "error")
+    assert "1 % unexplained" in sentences.budget_sentence(terms)
+    inside = sentences.budget_sentence(terms, "error")
     assert inside.endswith("what is left is inside the usual error of the model.")
 
 
 def test_shares_are_explained_where_they_can_be_misread() -> None:
     rest = term("unexplained", 0.0, 0.0)
     quiet = synthetic.diagnosis(budget=[term("parameters", 1.0, 0.1), rest])
-    assert words.BUDGET_NOTE[:30] not in " ".join(quiet.summary().split())
+    assert sentences.BUDGET_NOTE[:30] not in " ".join(quiet.summary().split())
     for taken in (
         [term("parameters", -0.2, 0.1), term("effect", 1.2, 0.1, "muscle_creep")],
         [term("parameters", -0.1, 0.1)],
         [term("parameters", 0.7, 0.1), term("effect", 0.3, 0.1, "muscle_creep")],
     ):
         told = " ".join(synthetic.diagnosis(budget=[*taken, rest]).summary().split())
-        assert words.BUDGET_NOTE in told
+        assert sentences.BUDGET_NOTE in told
 
 
 @pytest.mark.parametrize(
@@ -125,7 +124,7 @@ def test_shares_are_explained_where_they_can_be_misread() -> None:
 )
 def test_a_size_says_which_recordings_it_is_of(role: str, where: str) -> None:
     kept = Unexplained("arm", "joint_angle", "rad", 21.0, 0.007, "unlisted", role=role)
-    assert f"is 21 times the noise level (0.40 deg){where} and" in words.kept_sentence(kept)
+    assert f"is 21 times the noise level (0.40 deg){where} and" in sentences.kept_sentence(kept)
 
 
 def test_one_size_of_a_mismatch_stands_everywhere() -> None:
@@ -140,17 +139,18 @@ def test_one_size_of_a_mismatch_stands_everywhere() -> None:
     }
     found = seen(group("arm", "joint_angle", 0.9, effects=["muscle_creep"]), fit=fit)
     told = "11 noise levels (0.63 deg)"
-    assert str(words.miss(found, "joint_angle", "refit")) == told
-    assert words.mended_sentence(found, "With it,") == (
-        f"With it, the model misses joint angle by 1.0 noise levels (0.057 deg) instead of {told}"
+    assert str(sentences.miss(found, "joint_angle", "refit")) == told
+    assert sentences.mended_sentence(found, "With it,") == (
+        f"With it, the model misses joint angle by 1.0 noise levels (0.057 deg) instead of {told}, "
+        "on held-out recordings."
     )
     other = group("chamber", "muscle_pressure", 0.9)
     page = render_html(seen(other, found.judged[0], fit=fit, traces=[]))
     assert "11× noise" in page  # the table of errors
     assert "11 noise levels (0.63 deg)" in page  # block by block, and why parameters lost
-    assert words.miss(found, "force", "refit") is None
+    assert sentences.miss(found, "force", "refit") is None
     none = seen(group("arm", "joint_angle", 0.9), fit={**fit, "held_out": {}})
-    assert words.mended_sentence(none, "With it,") == ""
+    assert sentences.mended_sentence(none, "With it,") == ""
 
 
 def test_residuals_of_both_signs_do_not_cancel() -> None:
@@ -191,4 +191,4 @@ def test_a_miss_inside_the_usual_error_of_a_model_is_said_so() -> None:
         found = synthetic.diagnosis(
             blocks=[quiet], verdict="none", effects=[], probabilities={"none": 1.0}, fit=fit
         )
-        assert story.title(found).endswith(f"the model explains these recordings {told}")
+        assert sentences.title(found).endswith(f"the model explains these recordings {told}")

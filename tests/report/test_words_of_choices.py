@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pamrs.findings import EffectFound, EffectParameterFound
-from pamrs.report.text import value_words
+from pamrs.report.sentences import value_words
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.experiments import Experiment, experiments_of, library
 from pamrs.findings import HEALTHY, NextExperiment
 from pamrs.recordings import Recording
-from pamrs.report.text import hypothesis_label, listed, spoken_name
+from pamrs.report.words import hypothesis_label, listed, spoken_name
 from pamrs.rig import Rig
 
 _LEAST_NOISES: Final = 1.0  # [noise levels] below which a pair is not told apart

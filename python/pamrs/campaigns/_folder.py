@@ -23,7 +23,7 @@ from pamrs.errors import CaseError, SimulationError
 from pamrs.experiments import protocol_of
 from pamrs.findings import Protocol, to_plain
 from pamrs.recordings import OwnValue, Recording, load_recording
-from pamrs.report.text import hypothesis_label
+from pamrs.report.words import hypothesis_label
 from pamrs.rig import Rig, load_rig
 
 SCHEMA: Final = "pamrs.campaign/1"

@@ -14,7 +14,7 @@ from pamrs.campaigns._folder import Folder, Step, columns_of
 from pamrs.channels import laboratory_unit
 from pamrs.report.figures import HYPOTHESES, svg_text
 from pamrs.report.page import render_page
-from pamrs.report.text import format_probability, hypothesis_label, listed, set_label, spoken_name
+from pamrs.report.words import format_probability, hypothesis_label, listed, set_label, spoken_name
 
 _TEMPLATE: Final = Path(__file__).with_name("page.html.j2")
 _MOST_PANELS: Final = 4

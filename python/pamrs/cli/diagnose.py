@@ -170,7 +170,7 @@ def _outside_recorded(protocol: Protocol, case: Case) -> list[str]:
     """Commands of an experiment that leave the range in which the recordings have them."""
     import numpy as np
 
-    from pamrs.report.text import sized
+    from pamrs.report.words import sized
 
     warnings = []
     for name, values in protocol.commands.items():

@@ -17,7 +17,7 @@ from pamrs.channels import laboratory_unit
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError
 from pamrs.findings import VERDICTS, Findings, ModelFile, Trace, fields_from, to_plain
-from pamrs.report import story
+from pamrs.report import sentences
 from pamrs.report.terminal import notebook, summary
 
 __all__ = [
@@ -187,7 +187,7 @@ class Diagnosis(View, Findings):
     @property
     def headline(self) -> str:
         """The verdict in one sentence."""
-        return story.headline(self)
+        return sentences.headline(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON file: null for no number."""

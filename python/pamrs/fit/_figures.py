@@ -12,7 +12,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from pamrs._arrays import Array, Index
 from pamrs.errors import FitError
 from pamrs.report.figures import COLOURS, summary_figure
-from pamrs.report.text import format_number
+from pamrs.report.words import format_number
 
 if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap

@@ -18,7 +18,8 @@ from pamrs.effects import EFFECTS
 from pamrs.findings import BlockMismatch, Findings
 from pamrs.report.figures import COLOURS
 from pamrs.report.page import render_page
-from pamrs.report.text import format_number, label, left_in, miss
+from pamrs.report.sentences import refit_words, unsure_names
+from pamrs.report.words import label
 from pamrs.rig import Rig
 
 COLUMN, BOX, LINE, PAD, GAP = 186.0, 134.0, 17.0, 14.0, 34.0
@@ -258,21 +259,25 @@ def _middle(rows: list[float], otherwise: float) -> float:
 
 def _mark(parts: dict[str, _DrawnBlock], diagnosis: Findings) -> None:
     """Mark the blocks in which something was found, with what was found."""
-    answer = diagnosis.answer
-    open_ = {n for p in answer.parts for n in p.names if not p.sure or answer.missed}
-    for effect in (e for e in diagnosis.effects if e.term in answer.named):
-        kind = EFFECTS[effect.id].block if effect.id in EFFECTS else ""
-        doubt = "perhaps " if effect.term in open_ else ""
-        for part in _at(parts, kind, effect.at):
-            part.found.append(f"{doubt}missing: {label(effect.id)}")
+    unsure = unsure_names(diagnosis)
+    marks = [
+        (
+            EFFECTS[effect.id].block if effect.id in EFFECTS else "",
+            effect.at,
+            "perhaps " * (effect.term in unsure) + f"missing: {label(effect.id)}",
+        )
+        for effect in diagnosis.effects
+        if effect.term in diagnosis.answer.named
+    ]
     for wrong in diagnosis.wrong_parameters:
         kind, _, rest = wrong.name.partition(".")
         name, _, key = rest.rpartition(".")
         if kind == "sensors":
             kind = "chamber" if key.startswith("pressure") else "joint"
-        doubt = "perhaps wrong: " if wrong.name in open_ else "wrong: "
+        marks.append((kind, name, "perhaps " * (wrong.name in unsure) + f"wrong: {label(key)}"))
+    for kind, name, text in marks:
         for part in _at(parts, kind, name):
-            part.found.append(doubt + label(key))
+            part.found.append(text)
 
 
 def _at(parts: dict[str, _DrawnBlock], kind: str, name: str) -> list[_DrawnBlock]:
@@ -328,26 +333,22 @@ class _Drawing:
 
     def _lines(self, part: _DrawnBlock) -> list[tuple[str, str]]:
         """Text lines of a box with their kind: ``measured``, ``unmeasured`` or ``found``."""
-        out = []
-        for channel in CHANNELS[part.kind]:
-            given = dotted(channel, part.name) in self.diagnosis.measured
-            if given or (channel in ALWAYS and self.diagnosis.measured):
-                out.append((label(channel), "measured" if given else "unmeasured"))
-        for text in part.found:
-            out += [(line, "found") for line in textwrap.wrap(text, 18)]
-        return out
+        measured = self.diagnosis.measured
+        out = [
+            (label(channel), "measured" if given else "unmeasured")
+            for channel in CHANNELS[part.kind]
+            if (given := dotted(channel, part.name) in measured) or (measured and channel in ALWAYS)
+        ]
+        return out + [(line, "found") for own in part.found for line in textwrap.wrap(own, 18)]
 
     def _judged(self) -> list[tuple[str, list[str], BlockMismatch | None]]:
         """Blocks of the diagnosis, each with the boxes in it."""
         own = {m.block: m for b in self.diagnosis.judged for m in b.mismatch}
-        names = own or dict.fromkeys(self.diagnosis.residuals)
-        found = []
-        for name in names:
-            kind, _, of = name.partition(".")
-            inside = list(self._inside(kind, of))
-            if inside:
-                found.append((name, inside, own.get(name)))
-        return found
+        return [
+            (name, inside, own.get(name))
+            for name in own or self.diagnosis.residuals
+            if (inside := list(self._inside(*name.partition(".")[::2])))
+        ]
 
     def _inside(self, kind: str, name: str) -> Iterable[str]:
         """Boxes of a block of the diagnosis: a chamber with what feeds it, a joint or a load with
@@ -388,14 +389,7 @@ class _Drawing:
         low = max(place[n][1] + height[n] for n in inside) + pad + (20.0 if under else 0.0)
         title = low - 8.0 if under else y + 17.0
         lit = name == (self.diagnosis.answer.block or self.diagnosis.where.block)
-        left = left_in(self.diagnosis, name, "refit")
-        missed = mismatch and miss(self.diagnosis, mismatch.channel, "refit")
-        times = format_number(missed.noises, 2) if missed else ""
-        left = "noise" if times == "1.0" else left
-        begins = {"error": "usual error: ", "more": "misses "}.get(left)
-        size = "fits to the noise" if left == "noise" else ""
-        if begins and times:
-            size = f"{begins}{times} × noise"
+        left, size = refit_words(self.diagnosis, name, mismatch.channel if mismatch else None)
         colour = COLOURS["before"] if lit or left == "more" else "#8a94a3"
         text = textwrap.shorten(size, int((right - x) / 6.4), placeholder=" …")
         return dict(x=x, y=y, right=right, low=low, title=title, lit=lit, colour=colour, text=text)

@@ -7,7 +7,7 @@ from typing import Any
 
 from pamrs.channels import unit_of
 from pamrs.findings import Compared
-from pamrs.report import text as words
+from pamrs.report import words
 from pamrs.report.page import render_page
 from pamrs.units import with_unit
 
@@ -22,8 +22,8 @@ def _value(own: dict[str, Any] | None) -> str:
         return "not determined"
     unit, factor = words.display_unit(own["unit"] or "", abs(own["value"]))
     std = None if own["std"] is None else own["std"] * factor
-    text = words.format_uncertain(own["value"] * factor, std, unicode=False)
-    return with_unit(text, unit.replace("°", "deg"))
+    text = words.format_uncertain(own["value"] * factor, std)
+    return words.plain(with_unit(text, unit))
 
 
 def tables(found: Compared) -> list[tuple[str, list[tuple[str, str, str]]]]:
@@ -39,7 +39,7 @@ def tables(found: Compared) -> list[tuple[str, list[tuple[str, str, str]]]]:
         return _NOTHING if value is None else words.sized(value, unit_of(name.rpartition(": ")[2]))
 
     def noises(value: float | None) -> str:
-        return _NOTHING if value is None else words.format_number(value, 2, unicode=False)
+        return _NOTHING if value is None else words.plain(words.format_number(value, 2))
 
     def spoken(block: str | None) -> str:
         return words.spoken_name(block) if block else _NOTHING

@@ -20,9 +20,9 @@ from matplotlib.figure import Figure
 from pamrs._arrays import Array
 from pamrs._views import decimate
 from pamrs.findings import YOURS, Curves, Findings, MissingInput, Trace
-from pamrs.report.text import (
+from pamrs.report.sentences import free_run_words
+from pamrs.report.words import (
     display_unit,
-    format_number,
     hypothesis_label,
     is_number,
     spoken_name,
@@ -185,43 +185,43 @@ def _line(name: str, stage: str, time: Array, values: Array, **how: Any) -> Plot
     return PlotLine(name, COLOURS[stage], *decimate(time, values), **how)
 
 
-def _compared(trace: Trace, factor: float) -> list[PlotLine]:
-    """Curves of the measurement, and of the model of the rig file."""
-    measured = _line("measured", "measured", trace.time, trace.measured * factor, width=2.6)
-    return [measured, _line("your model", "before", trace.time, trace.before * factor)]
+def _compared(
+    trace: Trace, final: str, before: Array | None, *, refitted: bool = False
+) -> tuple[str, float, list[PlotLine]]:
+    """Curves of the measurement and of the models, that of the final one where it differs from one
+    before, with the unit that they are shown in and the factor from SI.
+    """
+    unit, factor = display_unit(trace.unit, _largest(trace.measured))
+    shown: list[tuple[str, str, Any, dict[str, Any]]] = [
+        ("measured", "measured", trace.measured, {"width": 2.6}),
+        ("your model", "before", trace.before, {}),
+        *([("refitted", "refit", trace.refit, {"dashed": True})] if refitted else []),
+    ]
+    if final != YOURS and _has(trace.after, before):
+        shown.append((final, "after", trace.after, {}))
+    lines = [_line(name, stage, trace.time, own * factor, **how) for name, stage, own, how in shown]
+    return unit, factor, lines
 
 
 def free_panels(diagnosis: Findings) -> list[Panel]:
     """The worst recording from its commands alone: measured, your model and the final one, the
     channels first that your model misses most; the telling trace where there is no free run.
     """
-    runs = {run.recording: run.channels for run in diagnosis.free_run or []}
-
-    def missed(trace: Trace) -> float:
-        error = runs.get(trace.recording, {}).get(trace.channel)
-        return error.times_before if error else 0.0
-
-    def missed_by(trace: Trace, factor: float) -> str:
-        error = runs.get(trace.recording, {}).get(trace.channel)
-        if error is None:
-            return ""
-        before, after = (format_number(v * factor, 2) for v in (error.before, error.after))
-        return f": missed by {before}, {final.split()[0]} {after}"
-
     final = diagnosis.answer.model
-    traces = sorted(diagnosis.free_traces, key=missed, reverse=True)
-    if not traces:
-        first = telling_trace(diagnosis)
-        return trace_panels(diagnosis, [first]) if first else []
+    errors = {
+        (run.recording, channel): error
+        for run in diagnosis.free_run or []
+        for channel, error in run.channels.items()
+    }
+    pairs = [(t, errors.get((t.recording, t.channel))) for t in diagnosis.free_traces]
+    pairs.sort(key=lambda pair: pair[1].times_before if pair[1] else 0.0, reverse=True)
     panels = []
-    for trace in traces[:MOST_FREE]:
-        unit, factor = display_unit(trace.unit, _largest(trace.measured))
-        lines = _compared(trace, factor)
-        if trace.after is not None and final != YOURS and _has(trace.after, trace.before):
-            lines.append(_line(final, "after", trace.time, trace.after * factor))
-        title = _quantity(spoken_name(trace.channel), unit) + missed_by(trace, factor)
-        panels.append(Panel(title, lines))
-    return panels
+    for trace, error in pairs[:MOST_FREE]:
+        unit, factor, lines = _compared(trace, final, trace.before)
+        missed = free_run_words(error, factor, final) if error else ""
+        panels.append(Panel(_quantity(spoken_name(trace.channel), unit) + missed, lines))
+    first = telling_trace(diagnosis)
+    return panels or (trace_panels(diagnosis, [first]) if first else [])
 
 
 def trace_panels(diagnosis: Findings, traces: Sequence[Trace]) -> list[Panel]:
@@ -239,14 +239,8 @@ def trace_panels(diagnosis: Findings, traces: Sequence[Trace]) -> list[Panel]:
         # the intervals are those of one recording
         marked = diagnosis.where.recording == trace.recording
         spans = diagnosis.where.intervals if marked else []
-        unit, factor = display_unit(trace.unit, _largest(trace.measured))
-        lines = _compared(trace, factor)
-        refitted = trace.refit is not None and _has(trace.refit, trace.before)
-        if trace.refit is not None and refitted:
-            curve = trace.refit * factor
-            lines.append(_line("refitted", "refit", trace.time, curve, dashed=True))
-        if trace.after is not None and final != YOURS and _has(trace.after, trace.refit):
-            lines.append(_line(final, "after", trace.time, trace.after * factor))
+        refitted = _has(trace.refit, trace.before)
+        unit, _, lines = _compared(trace, final, trace.refit, refitted=refitted)
         panels.append(Panel(_quantity(spoken_name(trace.channel), unit), lines, 0.0, spans))
         before, after = trace.residual_before, trace.residual_after
         unit, factor = display_unit(trace.unit, _largest(before, after))
@@ -397,15 +391,17 @@ HYPOTHESES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#c79a00", "#56b4e9")
 """Colours of hypotheses, the leading one first (Okabe and Ito)."""
 
 
-def separating_panels(own: Curves) -> list[Panel]:
+def separating_panels(own: Curves | None) -> list[Panel]:
     """The next experiment as every hypothesis predicts it, and what each cannot explain of the
     leading one's outcome.
 
     Parameters
     ----------
-    own : Curves
-        Those of the next experiment.
+    own : Curves or None
+        Those of the next experiment; None where it was not simulated.
     """
+    if own is None:
+        return []
     colours = dict(zip(own.predicted, HYPOTHESES, strict=False))
     found = []
     for time, values, what, noise in (

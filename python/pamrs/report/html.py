@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -13,95 +13,37 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from pamrs._losses import Losses
-from pamrs.findings import (
-    HEALTHY,
-    YOURS,
-    BlockMismatch,
-    BlockVerdict,
-    ChannelError,
-    Findings,
-    Trace,
-)
-from pamrs.report import figures, story
-from pamrs.report import text as words
+from pamrs.findings import HEALTHY, YOURS, BlockMismatch, Findings
+from pamrs.report import figures, sentences, words
 from pamrs.report.chain import chain_svg
 from pamrs.report.page import render_page
+from pamrs.report.words import format_number, in_one_unit, is_number, spoken_name, typeset
 
 TRACES = 3
 """Channels of a recording that are drawn."""
 _LEAST_CONDITION = 0.005  # share of the excess below which a condition is not named: 0 %
 THROUGHOUT = 0.9
 """Share of a recording from which an excess is throughout it."""
-_BADGES = {
-    "none": ("nothing missing", "nothing missing, but not settled"),
-    "parameters": ("parameters inside their tolerances", "parameters or physics, not settled"),
-    "effects": ("missing physics named", "missing physics, the name is not settled"),
-    "unlisted": ("missing physics, no name", "missing physics, no name"),
-    "units": ("", "a channel is in another unit"),
-    "wrong": ("a value of the rig file is wrong", "a value of the rig file may be wrong"),
-}
-"""Verdicts in a few words, settled and not settled; ``wrong`` is ``parameters`` where a value is
-named."""
-_MORE = ("not settled: what is missing was not found", "not settled: more is missing")
-"""Verdicts where the final model still misses too much: without a name, and with one."""
 
 
-def _badge(verdict: str, named: Sequence[str], *, settled: bool) -> str:
-    """A verdict in a few words, no surer than it is."""
-    return _BADGES["wrong" if named and verdict == "parameters" else verdict][not settled]
+def _span(bounds: tuple[float, ...] | None, digits: int = 3) -> str:
+    return " to ".join(format_number(bound, digits) for bound in bounds) if bounds else "–"
 
 
-def case_badge(diagnosis: Findings) -> str:
-    """The answer in a few words."""
-    answer = diagnosis.answer
-    if answer.missed:
-        return _MORE[bool(answer.named)]
-    return _badge(answer.verdict, answer.named, settled=answer.settled)
-
-
-def _span(bounds: tuple[float, float] | None, digits: int = 3) -> str:
-    if bounds is None:
-        return "–"
-    return f"{words.format_number(bounds[0], digits)} to {words.format_number(bounds[1], digits)}"
-
-
-def _unit(unit: Any) -> str:
+def _unit(unit: str) -> str:
     """Unit with raised powers; empty for dimensionless."""
-    text = str(unit or "")
-    if text in {"1", "-", ""}:
-        return ""
-    for digit, raised in (("2", "²"), ("3", "³"), ("4", "⁴")):
-        text = text.replace(f"^{digit}", raised)
-        for letter in ("m", "s", "K"):
-            text = text.replace(f"{letter}{digit}", f"{letter}{raised}")
-    return text
-
-
-def _typeset(text: str) -> str:
-    """Text of a terminal as a page has it: ``361.9 ± 1.2 cm³``."""
-    raised = re.sub(r"\b(c?m?m)([23])\b", lambda m: m[1] + {"2": "²", "3": "³"}[m[2]], text)
-    return raised.replace("+-", "±")
-
-
-def _verdict(diagnosis: Findings, block: BlockVerdict) -> tuple[str, str, str]:
-    """The verdict of a group of blocks, what it names, and what leads with its probability."""
-    part = diagnosis.answer.part_of(block.blocks[0])
-    if part is None:
-        return "", "", ""
-    lacking = {m.block for m in diagnosis.answer.missed} & {*block.blocks}
-    badge = _badge(block.verdict, part.names, settled=part.sure and not lacking)
-    leading = f"{words.answer_label(part.words)}, {words.chance_words(part)}"
-    return badge, words.set_label(list(part.names)) if part.names else "–", leading
+    raised = {"2": "²", "3": "³", "4": "⁴"}
+    text = re.sub(r"(?:\^|(?<=[msK]))([234])", lambda m: raised[m[1]], unit)
+    return "" if text in {"1", "-"} else text
 
 
 def _missed(diagnosis: Findings, block: BlockMismatch) -> list[str]:
     """Errors of a block, refitted and with what was found, in words."""
     texts = []
     for stage in ("refit", "after"):
-        missed = words.miss(diagnosis, block.channel, stage)
-        left = words.left_in(diagnosis, block.block, stage)
-        note = {"noise": ", noise only", "error": ", inside its usual error"}.get(left, "")
-        texts.append(f"{_typeset(str(missed))}{note}" if missed else "–")
+        missed = sentences.miss(diagnosis, block.channel, stage)
+        note = sentences.LEFT[sentences.left_in(diagnosis, block.block, stage) or "more"][1]
+        texts.append(f"{typeset(str(missed))}{note}" if missed else "–")
     return texts
 
 
@@ -113,9 +55,7 @@ def _share(share: float | None) -> str:
     """A share of the mismatch in percent."""
     if share is None:
         return "not fitted"
-    if share >= 1.0:
-        return "all"
-    return f"{100 * share:.0f} %" if share > 0.005 else "under 1 %"
+    return "all" if share >= 1.0 else words.format_share(max(share, 1e-9))
 
 
 def _intervals(diagnosis: Findings) -> list[str]:
@@ -136,15 +76,13 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
         known, size = p.known or name in wrong, abs(p.moved_sigmas)
         unit, factor = words.display_unit(p.unit, max(abs(p.nominal), abs(p.value)))
         shown = known and math.isfinite(size)
-        flag = "the rig file is wrong" if name in wrong else ""
-        if not flag and not known:
-            flag = "not determined by these recordings"
-        elif not flag and size >= 2:
+        flag = "" if known else "not determined by these recordings"
+        if known and size >= 2:
             flag = "outside its tolerance" if size >= 3 else "at the edge of its tolerance"
         rows.append(
             {
                 "cells": (
-                    words.format_number(p.nominal * factor, 4),
+                    format_number(p.nominal * factor, 4),
                     words.format_uncertain(p.value * factor, p.std * factor) if known else "–",
                 ),
                 "name": name,
@@ -152,7 +90,7 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
                 "moved": _signed(p.moved_sigmas) if shown else "–",
                 "bar": min(1.0, size / 4.0) if shown else 0.0,
                 "right": p.moved_sigmas >= 0,
-                "flag": flag,
+                "flag": "the rig file is wrong" if name in wrong else flag,
                 "known": shown,
                 "alarm": known and size >= 3,
             }
@@ -160,32 +98,24 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def _fit(
-    errors: dict[str, ChannelError], stages: Mapping[str, str]
-) -> list[tuple[str, str, list[tuple[str, str, str]]]]:
-    """Errors by channel: its name and unit, and of each stage its key, value and noise levels."""
-    rows = []
-    for channel, unit, factor, entry in words.shown_errors(errors):
-        noise, cells = entry.noise, []
-        for key in stages:
-            value = entry[key]
-            known = words.is_number(value) and words.is_number(noise) and noise > 0
-            times = f"{words.format_number(value / noise, 2)}×" if known else "–"
-            shown = words.format_number(value * factor) if words.is_number(value) else "–"
-            cells.append((key, shown, "" if key == "noise" else times))
-        rows.append((words.spoken_name(channel), unit, cells))
-    return rows
-
-
 def _fits(diagnosis: Findings) -> list[tuple[str, list[Any], str]]:
-    """The tables of errors with their titles, and which errors the refit makes worse."""
-    held, fitted = diagnosis.fit.held_out, diagnosis.fit.channels
-    worse = "" if diagnosis.answer.verdict in HEALTHY else words.worse_sentence(held)
-    stages = words.shown_stages(diagnosis)
-    tables = (
-        ("Held-out recordings (not used for the fit)", _fit(held, stages), worse),
-        ("Fitted recordings", _fit(fitted, stages), ""),
-    )
+    """The tables of errors with their titles, and which errors the refit makes worse: of each
+    channel its name and unit, and of each stage its key, value and noise levels.
+    """
+    held, stages = diagnosis.fit.held_out, sentences.shown_stages(diagnosis)
+    worse = "" if diagnosis.answer.verdict in HEALTHY else sentences.worse_sentence(held)
+    tables = []
+    for title, errors, note in (
+        ("Held-out recordings (not used for the fit)", held, worse),
+        ("Fitted recordings", diagnosis.fit.channels, ""),
+    ):
+        rows = []
+        for channel, unit, cells, entry in words.error_cells(errors):
+            missed = {key: sentences.miss_of(entry, channel, key) for key in stages}
+            times = {k: f"{format_number(m.noises, 2)}×" if m else "–" for k, m in missed.items()}
+            own = [(key, cells[key], times[key] * (key != "noise")) for key in stages]
+            rows.append((spoken_name(channel), unit, own))
+        tables.append((title, rows, note))
     return [own for own in tables if own[1]]
 
 
@@ -195,47 +125,39 @@ def _free_run(diagnosis: Findings) -> list[tuple[str, str, str, list[str]]]:
     for run in diagnosis.free_run or []:
         for k, (channel, error) in enumerate(run.channels.items()):
             every = (error.before, error.after, error.cut_before, error.cut_after)[:: 1 + yours]
-            sizes = [abs(v) for v in every if words.is_number(v)]
-            unit, factor = words.display_unit(error.unit, max(sizes, default=math.nan))
-            cells = [words.format_number(v * factor) if words.is_number(v) else "–" for v in every]
-            rows.append((run.recording if k == 0 else "", words.spoken_name(channel), unit, cells))
+            cells, unit = in_one_unit(error.unit, every)
+            rows.append((run.recording if k == 0 else "", spoken_name(channel), unit, cells))
     return rows
-
-
-_LEFT = {
-    "noise": "left, no more than noise",
-    "error": "left, inside the usual error of the model",
-}
-"""Words for the rest of a block's budget, where it is nothing unexplained."""
 
 
 def _budget(diagnosis: Findings) -> list[tuple[str, list[dict[str, str]]]]:
     """Bars of the terms of each block's budget, each with its interval where the text has it."""
-    blocks = {name: words.reported_terms(own) for name, own in words.budgets(diagnosis).items()}
+    terms = sentences.budgets(diagnosis)
+    blocks = {name: sentences.reported_terms(own) for name, own in terms.items()}
     every = [v for own in blocks.values() for _, t in own for v in (t.share, *t.interval)]
     low, high = max(-1.0, min([0.0, *every])), min(2.5, max([1.0, *every]))
 
     def at(share: float) -> float:
         return 100.0 * (min(high, max(low, share)) - low) / (high - low)
 
+    def bar(first: float, last: float) -> str:
+        return f"left:{at(first):.2f}%;width:{at(last) - at(first):.2f}%"
+
     found = []
     for block, own in blocks.items():
-        rows = []
-        left = _LEFT.get(words.left_in(diagnosis, block), "")
-        for name, term in own:
-            ends = sorted((at(0.0), at(term.share)))
-            first, last = at(term.interval[0]), at(term.interval[1])
-            rows.append(
-                {
-                    "name": left if term.kind == "unexplained" and left else name,
-                    "kind": term.kind,
-                    "text": words.format_share(term.share),
-                    "interval": words.format_interval(term.interval),
-                    "bar": f"left:{ends[0]:.2f}%;width:{ends[1] - ends[0]:.2f}%",
-                    "whisker": f"left:{first:.2f}%;width:{last - first:.2f}%",
-                }
-            )
-        found.append((words.spoken_name(block), rows))
+        left = sentences.LEFT[sentences.left_in(diagnosis, block) or "more"][0]
+        rows = [
+            {
+                "name": (left if term.kind == "unexplained" else "") or name,
+                "kind": term.kind,
+                "text": words.format_share(term.share),
+                "interval": words.format_interval(term.interval),
+                "bar": bar(*sorted((0.0, term.share))),
+                "whisker": bar(*term.interval),
+            }
+            for name, term in own
+        ]
+        found.append((spoken_name(block), rows))
     return found
 
 
@@ -243,27 +165,18 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
     """Rows of what was found: name, in the rig file, on the bench, value and interval, unit."""
     rows: list[tuple[str, ...]] = []
     for effect in diagnosis.effects:
-        bench, vague = dict(story.bench_value(effect)), words.undetermined(effect)
-        closest = "" if effect.term in diagnosis.answer.named else "not named, but closest: "
-        for name, own in effect.parameters.items():
-            if name in vague:
-                continue
-            title = f"{closest}{words.label(effect.term)}: {words.label(name)}"
-            usual = bench.get(words.label(name)) or words.value_words(effect, name)
-            on_bench = _typeset(usual)
+        head = f"{sentences.closest_mark(diagnosis, effect)}{words.label(effect.term)}: "
+        for name, own, usual in sentences.effect_values(effect):
             value = words.format_uncertain(own.value, own.std)
-            rows.append((title, "", on_bench, value, _span(words.span95(own)), _unit(own.unit)))
-        if vague:
-            names = ", ".join(map(words.label, vague))
-            title = f"{closest}{words.label(effect.term)}: not determined"
-            rows.append((title, f"these recordings do not determine {names}"))
+            size = (typeset(usual), value, _span(words.span95(own)), _unit(own.unit))
+            rows.append((head + words.label(name), "", *size))
+        if vague := sentences.undetermined_sentence(effect):
+            rows.append((f"{head}not determined", vague))
     for entry in diagnosis.wrong_parameters:
-        unit, factor = words.display_unit(entry.unit, abs(entry.nominal))
-        low, high = (float(v) * factor for v in entry.interval)
-        stated = words.format_uncertain(entry.nominal * factor, entry.tolerance * factor)
-        value = words.format_uncertain(entry.value * factor, entry.std * factor)
+        found, stated, (unit, factor) = sentences.wrong_values(entry)
+        span = _span(tuple(v * factor for v in entry.interval), 4)
         far = f"{stated} ({_signed(entry.moved_sigmas)} tolerances)"
-        rows.append((entry.name, far, "", value, _span((low, high), 4), _unit(unit)))
+        rows.append((entry.name, far, "", found, span, _unit(unit)))
     return rows
 
 
@@ -275,66 +188,58 @@ def _limits(diagnosis: Findings) -> list[tuple[bool | str, ...]]:
         (
             own.effect in diagnosis.answer.named,
             words.label(own.effect),
-            words.spoken_name(own.block),
+            spoken_name(own.block),
             words.label(own.size.rpartition(".")[2]),
-            *words.limit_sizes(own)[1:],
+            *sentences.limit_sizes(own)[1:],
             words.set_label([own.rival]) if own.rival else "",
         )
         for own in diagnosis.limits
     ]
 
 
+def _markup(svg: str | None) -> Markup | None:
+    return None if svg is None else Markup(svg)  # noqa: S704
+
+
 def _curves(panels: list[figures.Panel], prefix: str) -> Markup | None:
-    return Markup(figures.curves(panels, prefix)) if panels else None  # noqa: S704
+    return _markup(figures.curves(panels, prefix)) if panels else None
 
 
 def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
     """One fitted and one held-out recording with their figure, and how many are not shown."""
     telling = figures.telling_trace(diagnosis)
-    groups: dict[tuple[str, str], list[Trace]] = {}
-    for trace in diagnosis.traces:
-        groups.setdefault((trace.role, trace.recording), []).append(trace)
-    keys = list(groups)
-    if telling is not None:
-        keys.sort(key=lambda k: k != (telling.role, telling.recording))
-    held = [k for k in keys if k[0] == "held_out"]
-    chosen = [k for k in keys if k not in held][:1] + held[:1]
+    first = telling and (telling.role, telling.recording)
+    groups = words.grouped(((t.role, t.recording), t) for t in diagnosis.traces)
+    keys = sorted(groups, key=lambda key: key != first)
+    held = [key for key in keys if key[0] == "held_out"]
+    chosen = [key for key in keys if key not in held][:1] + held[:1]
     shown = []
-    for i, key in enumerate(chosen):
-        traces = sorted(groups[key], key=lambda t: t.channel != diagnosis.where.channel)[:TRACES]
+    for i, (role, name) in enumerate(chosen):
+        traces = sorted(groups[role, name], key=lambda t: t.channel != diagnosis.where.channel)
         shown.append(
             {
-                "name": key[1],
-                "role": "held out" if key[0] == "held_out" else "used for the fit",
-                "curves": _curves(figures.trace_panels(diagnosis, traces), f"rec{i}"),
+                "name": name,
+                "role": "held out" if role == "held_out" else "used for the fit",
+                "curves": _curves(figures.trace_panels(diagnosis, traces[:TRACES]), f"rec{i}"),
             }
         )
     return shown, len(groups) - len(shown)
-
-
-def _missing(diagnosis: Findings) -> str | None:
-    """The missing input, where there is one."""
-    found = diagnosis.missing_input
-    return None if found is None else figures.missing_svg(found)
-
-
-def _markup(svg: str | None) -> Markup | None:
-    return None if svg is None else Markup(svg)  # noqa: S704
 
 
 def _value(value: object) -> str:
     """A value of an excitation; of several chains by their names."""
     if isinstance(value, Mapping):
         return "; ".join(f"{name}: {_value(own)}" for name, own in value.items())
-    if words.is_number(value) and not isinstance(value, bool):
-        return words.format_number(value)
+    if is_number(value) and not isinstance(value, bool):
+        return format_number(value)
     return str(value)
 
 
-def _separating(diagnosis: Findings) -> Markup | None:
-    """The curves of the next experiment, where it was simulated."""
-    own = diagnosis.next_experiment.curves
-    return _curves(figures.separating_panels(own), "next") if own else None
+def _paragraphs(diagnosis: Findings) -> list[str]:
+    """Paragraphs of the verdict, with the headline and the place where it has not said them."""
+    around = (f"{sentences.headline(diagnosis)}.", diagnosis.where.text)
+    lead, place = (own * (own not in diagnosis.text) for own in around)
+    return [own.strip() for own in (lead, *diagnosis.text.split("\n\n"), place) if own.strip()]
 
 
 def render(diagnosis: Findings) -> str:
@@ -350,9 +255,9 @@ def render(diagnosis: Findings) -> str:
     str
         HTML text.
     """
-    losses, proposed = Losses(), diagnosis.next_experiment
+    losses = Losses()
     pictures = {
-        name: _markup(losses.part(f"the picture of the {name}", partial(drawn, diagnosis)))
+        name: losses.part(f"the picture of the {name}", partial(drawn, diagnosis))
         for name, drawn in _PICTURES.items()
     }
     tables = {
@@ -362,7 +267,8 @@ def render(diagnosis: Findings) -> str:
     recordings, hidden = losses.part(
         "the pictures of the recordings", partial(_recordings, diagnosis), ([], 0)
     )
-    bits = proposed.expected_information_bits
+    said = {name: partial(make, diagnosis) for name, make in sentences.SENTENCES.items()}
+    bits = diagnosis.next_experiment.expected_information_bits
     settings = getattr(diagnosis, "settings", None)
     page = partial(
         render_page,
@@ -370,39 +276,27 @@ def render(diagnosis: Findings) -> str:
         script=Path(__file__).with_name("curves.js").read_text(encoding="utf-8"),
         d=diagnosis,
         w=words,
-        badge=case_badge(diagnosis),
-        title=_typeset(story.title(diagnosis)),
-        headline=_typeset(story.headline(diagnosis)),
-        paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
-        forms=list(
-            dict.fromkeys(
-                _typeset(form)
-                for form in (
-                    *(u.form for u in diagnosis.unexplained),
-                    *(e.correction for e in diagnosis.effects),
-                )
-                if form
-            )
-        ),
+        s=sentences,
+        badge=sentences.case_badge(diagnosis),
+        title=typeset(sentences.title(diagnosis)),
+        paragraphs=list(map(typeset, _paragraphs(diagnosis))),
+        forms=list(map(typeset, said["forms"]())),
         conditions=[c for c in diagnosis.where.conditions if c.share >= _LEAST_CONDITION],
-        stages=words.shown_stages(diagnosis),
+        stages=sentences.shown_stages(diagnosis),
         final=diagnosis.answer.model,
         yours=diagnosis.answer.model == YOURS,
-        # said above already, where the text has it
-        where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,
-        bits=words.format_number(bits, 2) if words.is_number(bits) else "",
+        bits=format_number(bits, 2) if is_number(bits) else "",
         recordings=recordings,
         hidden=hidden,
         free_head=figures.free_head(diagnosis),
-        record=story.next_to_do(diagnosis).split(": ", 1) if story.next_to_do(diagnosis) else [],
+        record=sentences.next_to_do(diagnosis).partition(": "),
         settings=settings.to_dict() if settings is not None else {},
         date=datetime.now().astimezone().isoformat(" ", "minutes"),
-        data=". ".join(
-            filter(None, (words.data_sentence(diagnosis), words.left_out_sentence(diagnosis)))
-        ),
+        data=". ".join(filter(None, (*said["data"](), *said["left_out"]()))),
         guarded=lambda what, caller: losses.part(f"the table of {what}", caller, ""),
-        cells={"share": _share, "value": _value, "typeset": _typeset},
-        verdict=partial(_verdict, diagnosis),
+        cells={"share": _share, "value": _value, "typeset": typeset, "capital": words.capital},
+        said=said,
+        verdict=partial(sentences.group_verdict, diagnosis),
         missed=partial(_missed, diagnosis),
         **pictures,
         **tables,
@@ -415,16 +309,20 @@ def render(diagnosis: Findings) -> str:
 
 
 #: What the template calls each, and what makes it.
-_PICTURES: Final[dict[str, Callable[[Findings], str | None]]] = {
-    "chain": chain_svg,
-    "missing": _missing,
+_PICTURES: Final[dict[str, Callable[[Findings], Markup | None]]] = {
+    "chain": lambda diagnosis: _markup(chain_svg(diagnosis)),
+    "missing": lambda diagnosis: (
+        _markup(figures.missing_svg(diagnosis.missing_input)) if diagnosis.missing_input else None
+    ),
     "first": lambda diagnosis: _curves(figures.free_panels(diagnosis), "free"),
-    "separating": _separating,
+    "separating": lambda diagnosis: _curves(
+        figures.separating_panels(diagnosis.next_experiment.curves), "next"
+    ),
 }
 _TABLES: Final[dict[str, Callable[[Findings], list[Any]]]] = {
-    "facts": story.facts,
-    "to_do": story.to_do,
-    "rivals": story.rivals,
+    "facts": sentences.facts,
+    "to_do": sentences.to_do,
+    "rivals": sentences.rivals,
     "found": _found,
     "budget": _budget,
     "intervals": _intervals,

@@ -10,7 +10,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from pamrs.findings import Findings
-from pamrs.report import story
+from pamrs.report import sentences
 from pamrs.report.chain import draw_chain
 from pamrs.report.figures import COLOURS, STYLE, draw_panels, free_head, free_panels, summary_figure
 from pamrs.rig import Rig
@@ -29,7 +29,7 @@ def summary_png(diagnosis: Findings) -> bytes:
     bytes
         PNG of 1600 x 1000 pixels.
     """
-    with summary_figure(story.title(diagnosis), 78) as (figure, finished):
+    with summary_figure(sentences.title(diagnosis), 78) as (figure, finished):
         heights = [1.5, 4.2] if isinstance(diagnosis.rig, Rig) else [0.01, 4.2]
         upper, lower = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
         draw_chain(upper.add_axes((0.02, 0.0, 0.96, 1.0), frameon=False), diagnosis)
@@ -58,10 +58,10 @@ def one_page_pdf(diagnosis: Findings) -> bytes:
         heights = [3.0, 1.4, 4.6, 2.3]
         parts = figure.subfigures(4, 1, height_ratios=heights, squeeze=False)[:, 0]
         top, chain, curves, bars = parts
-        texts = [f"{value} – {what}" for value, what in story.facts(diagnosis)]
-        texts += [*story.to_do(diagnosis), story.next_to_do(diagnosis)]
+        texts = [f"{value} – {what}" for value, what in sentences.facts(diagnosis)]
+        texts += [*sentences.to_do(diagnosis), sentences.next_to_do(diagnosis)]
         lines = [textwrap.fill(text, 100) for text in filter(None, texts)]
-        title = textwrap.fill(story.title(diagnosis), 60)
+        title = textwrap.fill(sentences.title(diagnosis), 60)
         style: dict[str, Any] = {"ha": "left", "va": "top"}
         top.text(0.05, 0.93, title, size=15, fontweight="bold", **style)
         top.text(0.05, 0.64, "\n".join(lines), size=9, linespacing=1.5, **style)
@@ -91,7 +91,7 @@ def _draw_first(part: Any, diagnosis: Findings, most: int) -> None:
 
 def _draw_rivals(part: Any, diagnosis: Findings) -> None:
     """The ranked bar of the explanations."""
-    rows = story.rivals(diagnosis)
+    rows = sentences.rivals(diagnosis)
     if not rows:
         return
     axes = part.subplots()

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from pamrs._writing import write_atomically
 from pamrs.errors import PamrsError
-from pamrs.report.text import hypothesis_label
+from pamrs.report.words import hypothesis_label
 
 RESULT: Final = "result"
 """Folder of the results, in the case folder."""

@@ -15,7 +15,7 @@ from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import Hypothesis, Term
 from pamrs.findings import Unexplained, WrongParameter, case_verdict
-from pamrs.report.text import kept_sentence, sentence_of
+from pamrs.report.sentences import kept_sentence, sentence_of
 from tests.diagnosis.asked import SETTINGS, blocks_of
 from tests.diagnosis.likelihoods import made_up
 from tests.diagnosis.noisy import SHOULDER

@@ -28,7 +28,7 @@ from pamrs.diagnosis.prepare import unjudged_blocks
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
 from pamrs.experiments import experiments_of
 from pamrs.findings import BlockVerdict, BudgetTerm, ChannelError, FreeRun, FreeRunError
-from pamrs.report import text as words
+from pamrs.report import sentences
 from tests.diagnosis.asked import SETTINGS, blocks_of, diagnosed, problem_of
 from tests.diagnosis.explain.test_assemble import NAMES, recorded
 from tests.diagnosis.kept import kept
@@ -220,13 +220,13 @@ def term(kind: str, share: float, name: str = "") -> BudgetTerm:
 
 def test_shares_that_cancel_are_told_together() -> None:
     rest = term("unexplained", 0.37)
-    told = words.budget_sentence(
+    told = sentences.budget_sentence(
         [term("parameters", -8.33), term("effect", 8.96, "muscle_creep"), rest]
     )
     assert told.startswith(
         "parameters inside tolerance and muscle creep together 63 % (53 to 73); 37 % unexplained"
     )
-    worse = words.budget_sentence(
+    worse = sentences.budget_sentence(
         [term("effect", -8.33, "muscle_creep"), term("unexplained", 9.33)]
     )
     assert "%" not in worse

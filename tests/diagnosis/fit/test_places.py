@@ -23,8 +23,8 @@ from pamrs.diagnosis.search import Attempts
 from pamrs.effects import CATALOGUE, Term, find_parameter
 from pamrs.findings import BlockVerdict, Part
 from pamrs.recordings import Recording
-from pamrs.report.story import headline
-from pamrs.report.text import label, told_apart
+from pamrs.report.sentences import headline, told_apart
+from pamrs.report.words import label
 from pamrs.simulation import core_rig
 from tests.diagnosis import again, likelihoods, synthetic
 from tests.diagnosis.asked import SETTINGS, diagnosed, problem_of

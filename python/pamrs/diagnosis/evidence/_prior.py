@@ -41,13 +41,13 @@ _UNSEEN_PRICE = 6.5
 _MOST_RANGE_PRICE = 4.0
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
 SHARED_ODDS = 6.0
-# shares of `UNDECIDED` (decision 4): of the less likely one of none and parameters, by whether
-# parameters moved; the other one has the rest
+# share of `UNDECIDED` (decision 4) that goes to none where parameters moved, and to parameters where
+# they did not; the likelier of both gets what remains
 _NOISE_ONLY_OTHER = 0.03
 # share of unlisted: in 24 of 171 such groups physics was missing that was too small to be seen
 _NOISE_ONLY_UNLISTED = 0.14
-# share of parameters where their values are unlikely: these explain all, at a price the owner would
-# mind; unlisted has the rest
+# share of parameters where their values are unlikely, of unlisted what remains: they explain all,
+# at a price the owner would mind
 _UNLIKELY_PARAMETERS = 0.75
 # [tolerances] moved to its wall (the setting most_tolerances), which is suspect (decision 25)
 WALL_TOLERANCES = 2.9

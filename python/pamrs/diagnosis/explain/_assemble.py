@@ -61,8 +61,8 @@ from pamrs.findings import (
     WrongParameter,
 )
 from pamrs.recordings import Case
-from pamrs.report.verdict import unknown_volumes
-from pamrs.report.verdict import verdict as verdict_in_words
+from pamrs.report.sentences import unknown_volumes
+from pamrs.report.sentences import verdict as verdict_in_words
 from pamrs.rig import Rig
 
 # [noise levels] gap of refit to noise below which nothing is said of how much closes

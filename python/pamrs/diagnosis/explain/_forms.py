@@ -15,7 +15,7 @@ from pamrs.diagnosis.prepare import Block, signals_at_starts
 from pamrs.effects import CLOSURE_OF, CLOSURE_TERMS, EFFECTS, MEMORY_OF, WORDS, ClosureTerm
 from pamrs.errors import DiagnosisError
 from pamrs.findings import Form
-from pamrs.report.text import listed
+from pamrs.report.words import listed
 from pamrs.simulation import core_rig, default_step
 
 

@@ -13,7 +13,7 @@ from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import Reading
 from pamrs.findings import ChannelError, FitErrors, Misread, NextExperiment, Where
 from pamrs.recordings import Case
-from pamrs.report.text import listed
+from pamrs.report.words import listed
 from pamrs.units import in_words
 
 

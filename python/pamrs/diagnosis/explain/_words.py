@@ -16,15 +16,8 @@ from pamrs.diagnosis.search import FAR_TOLERANCES
 from pamrs.effects import CATALOGUE, UNDECIDED, UNLISTED
 from pamrs.findings import Answer, ChannelError, ParameterFound, Where
 from pamrs.recordings import Case
-from pamrs.report.text import (
-    display_unit,
-    format_number,
-    format_probability,
-    miss_of,
-    spoken_block,
-    spoken_name,
-)
-from pamrs.report.verdict import unknown_volumes
+from pamrs.report.sentences import miss_of, unknown_volumes
+from pamrs.report.words import format_probability, sized_alike, spoken_block, spoken_name
 from pamrs.rig.schema import split_name
 from pamrs.units import in_words
 
@@ -229,11 +222,10 @@ def worse(table: dict[str, ChannelError]) -> list[str]:
     for channel in spoiled_channels(table):
         error = table[channel]
         better, which = min((error.before, "nominal"), (error.refit, "refitted"))
-        unit, factor = display_unit(unit_of(channel), error.after)
-        now, was = (format_number(v * factor, 3, unicode=False) for v in (error.after, better))
+        now, was = sized_alike([error.after, better], unit_of(channel))
         out.append(
-            f"the new model misses {spoken_name(channel)} by {now} {unit}, the {which} "
-            f"one by {was} {unit}: the values of this fit spoil the channel".replace("°", "deg")
+            f"the new model misses {spoken_name(channel)} by {now}, the {which} one by {was}: "
+            "the values of this fit spoil the channel"
         )
     return out
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import channel_of
 from pamrs.findings import MissingInput, MissingRecording, MissingTime, shown_unit
-from pamrs.report.text import format_number, listed, spoken_name
+from pamrs.report.words import format_number, listed, spoken_name
 
 _HATS = 8  # of a smooth function of one argument
 _FOLDS = 4  # of stretches of time: each is told from the others

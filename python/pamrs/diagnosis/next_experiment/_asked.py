@@ -35,7 +35,8 @@ from pamrs.experiments import (
     protocol_of,
 )
 from pamrs.findings import Answer, Findings, NextExperiment, PairExperiment, Part
-from pamrs.report.text import capital, hypothesis_label, left_in, spoken_name
+from pamrs.report.sentences import left_in
+from pamrs.report.words import capital, hypothesis_label, spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, supplies_of

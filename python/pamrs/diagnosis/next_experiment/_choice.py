@@ -46,7 +46,7 @@ from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments import Experiment, experiments_of, protocol_of
 from pamrs.findings import Curves, NextExperiment, PairExperiment, RankedExperiment
 from pamrs.recordings import Recording
-from pamrs.report.text import format_number, hypothesis_label, spoken_name
+from pamrs.report.words import format_number, hypothesis_label, spoken_name
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig, reading
 

@@ -9,7 +9,7 @@ from typing import Any
 from pamrs.effects import CATALOGUE, Term
 from pamrs.errors import ParameterError
 from pamrs.findings import Limit, to_plain
-from pamrs.report.text import limit_sizes
+from pamrs.report.sentences import limit_sizes
 from pamrs.rig import Units
 
 

@@ -32,7 +32,7 @@ from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments import Experiment, library
 from pamrs.findings import DETECTED
-from pamrs.report.text import spoken_name
+from pamrs.report.words import spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig

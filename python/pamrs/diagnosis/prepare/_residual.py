@@ -19,7 +19,7 @@ from pamrs.diagnosis.prepare._blocks import Block, Input, available_blocks
 from pamrs.diagnosis.prepare._signals import DRIVES, NOISE_STDS, Prepared
 from pamrs.errors import SimulationError
 from pamrs.recordings import OwnValue, Recording
-from pamrs.report.text import format_number
+from pamrs.report.words import format_number, plain
 from pamrs.rig import Rig, effect_parameter
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig, default_step
@@ -816,7 +816,7 @@ def notes_on_own_values(recordings: Sequence[Prepared]) -> list[str]:
         del values_of[parameter]
     for parameter, values in values_of.items():
         low, high = min(values.values()), max(values.values())
-        listed = ", ".join(f"{format_number(v, unicode=False)} in {n}" for n, v in values.items())
+        listed = ", ".join(f"{plain(format_number(v))} in {n}" for n, v in values.items())
         apart = (
             f"; the largest is {high / low:.2g} times the smallest"
             if low > 0.0 and high / low > _OWN_APART

@@ -260,7 +260,7 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
     return replace(fits, gain=gain, std=gain * abs(step) * std)
 
 
-def _is_noise(problem: Problem, fitted: Fit, levels: Mapping[Key, NoiseLevel]) -> bool:
+def _is_noise(problem: Problem, fitted: Fit, levels: dict[Key, NoiseLevel]) -> bool:
     """True where a fit leaves no more than noise in any block."""
     excesses = [
         excess(b, problem.recordings, fitted.residuals, levels, problem.settings)

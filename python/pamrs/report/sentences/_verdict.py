@@ -1,4 +1,4 @@
-"""The verdict of a diagnosis in a few sentences."""
+"""The verdict of a diagnosis in a few paragraphs."""
 
 from __future__ import annotations
 
@@ -7,25 +7,29 @@ from collections.abc import Sequence
 from pamrs.channels import unit_of
 from pamrs.findings import EffectFound, Findings, Part, WrongParameter
 from pamrs.recordings import Case
-from pamrs.report.text import (
-    capital,
-    display_unit,
-    down_to,
-    effect_name,
-    format_number,
-    format_probability,
-    is_number,
-    judged_place,
+from pamrs.report.sentences._answer import (
+    healthy_sentence,
+    name_chance,
+    searched,
+    unsettled_sentence,
+    unsure_names,
+)
+from pamrs.report.sentences._entries import (
     kept_sentence,
-    listed,
     mended_sentence,
     missed_sentence,
-    name_chance,
     not_judged_words,
-    searched,
     sentence_of,
+)
+from pamrs.report.words import (
+    capital,
+    effect_name,
+    format_probability,
+    is_number,
+    listed,
+    place,
+    sized_alike,
     spoken_name,
-    unsettled_sentence,
 )
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
@@ -46,51 +50,52 @@ def verdict(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) 
 
     ``forms`` say what a mismatch without a name is a function of, if that was ``sought``.
     """
-    answer, first = diagnosis.answer, diagnosis.answer.parts[:1]
+    answer = diagnosis.answer
     without = [p for p in answer.parts if p.group.verdict == "unlisted"]
-    still = [f"{missed_sentence(diagnosis, len(answer.missed))}."] * bool(answer.missed)
-    main = [] if first or answer.missed else [_healthy(diagnosis)]
-    main += [_effects(diagnosis, case), _mistaken(diagnosis)]
-    unexplained = _without_name(diagnosis, without) if without else ""
-    if first and first == without[:1]:  # what has no name leads
-        main, unexplained = [unexplained, *main], ""
     healthy = [p for p in answer.parts if not p.names and p not in without]
-    main += [
-        f"The {spoken_name(p.block or 'rig')} may lack nothing "
-        f"(probability {format_probability(p.probability)})."
-        for p in healthy
+    unexplained = _without_name(diagnosis, without) if without else ""
+    leads = answer.parts[:1] == without[:1]  # what has no name
+    main = [
+        "" if answer.parts or answer.missed else _healthy(diagnosis),
+        unexplained if leads else "",
+        _effects(diagnosis, case),
+        _mistaken(diagnosis),
+        *(
+            f"The {place(p)} may lack nothing (probability {format_probability(p.probability)})."
+            for p in healthy
+        ),
+        diagnosis.where.text if healthy and answer.parts[:1] == healthy[:1] else "",
     ]
-    main += [diagnosis.where.text] if first and first == healthy[:1] else []
+    still = [f"{missed_sentence(diagnosis, len(answer.missed))}."] * bool(answer.missed)
     main = [*main, *still] if answer.named else [*still, *main]
-    main.append(unsettled_sentence(diagnosis))
-    form = _form(diagnosis, case, forms, sought=sought) if without or forms else ""
-    ends = [f"{capital(words)}." for words in not_judged_words(diagnosis)]
-    paragraphs = [" ".join(filter(None, main)), unexplained, form, *ends]
+    paragraphs = [
+        _joined(*main, unsettled_sentence(diagnosis)),
+        "" if leads else unexplained,
+        _form(diagnosis, case, forms, sought=sought) if without or forms else "",
+        *(f"{capital(words)}." for words in not_judged_words(diagnosis)),
+    ]
     return "\n\n".join(filter(None, paragraphs))
 
 
+def _joined(*sentences: str) -> str:
+    return " ".join(filter(None, sentences))
+
+
 def _healthy(diagnosis: Findings) -> str:
-    """The verdict where nothing is missing."""
-    judged = "every block that was judged" if diagnosis.not_judged else "every block"
-    shows = f"These recordings show no missing physics{judged_place(diagnosis)}"
-    if diagnosis.answer.verdict == "none":
-        return f"{shows}: the nominal model predicts {judged} {down_to(diagnosis)}."
+    """The verdict where nothing is missing, and the values that moved most."""
+    text = f"{healthy_sentence(diagnosis)}."
     far = {n: p.moved_sigmas for n, p in diagnosis.parameters.items() if p.known}
+    if diagnosis.answer.verdict == "none" or not far:
+        return text
     most = sorted(far.items(), key=lambda item: -abs(item[1]))[:_MOST_MOVED]
-    moved = ", ".join(f"{n} by {size:+.1f} tolerances" for n, size in most)
-    return (
-        f"{shows}, but parameters differ from their nominal values. With values inside their "
-        f"tolerances the model predicts {judged} {down_to(diagnosis)}."
-        + (f" Moved most: {moved}." if moved else "")
-    )
+    return f"{text} Moved most: {', '.join(f'{n} by {v:+.1f} tolerances' for n, v in most)}."
 
 
 def _opening(diagnosis: Findings, named: Sequence[EffectFound | WrongParameter], claim: str) -> str:
     """A claim, no surer than it is: as what is most probable where it is not settled."""
     names = {own.term if isinstance(own, EffectFound) else own.name for own in named}
-    sure = all(p.sure for p in diagnosis.answer.parts if names & {*p.names})
-    settled = sure and not diagnosis.answer.missed
-    return capital(claim) if settled else f"Most probable is that {claim}"
+    unsure = diagnosis.answer.missed or names & unsure_names(diagnosis)
+    return f"Most probable is that {claim}" if unsure else capital(claim)
 
 
 def _effects(diagnosis: Findings, case: Case) -> str:
@@ -101,25 +106,21 @@ def _effects(diagnosis: Findings, case: Case) -> str:
     effects = [
         f"{effect_name(e)} ({e.id}, probability {name_chance(diagnosis, e.term)})" for e in found
     ]
-    text = f"{_opening(diagnosis, found, 'the model leaves out')}: {listed(effects)}."
     leads = diagnosis.answer.parts[0]
-    if leads.group.effects:
-        text += f" {diagnosis.where.text}"
-    if not any(e.correction for e in found):  # else what the model misses with both is told there
-        text += _closed(diagnosis, "With it," if len(found) == 1 else "With them,")
-    if unknown_volumes(case.rig):
-        text += (
-            " The chamber's volume is not known. The recording determines the time constant and "
-            "the conductance per volume; the conductance itself holds only for the placeholder "
-            "volume of the rig file."
-        )
-    return text
-
-
-def _closed(diagnosis: Findings, by: str) -> str:
-    """Sentence on what the model misses then; empty where that is not known."""
-    sentence = mended_sentence(diagnosis, by)
-    return f" {sentence}, on {diagnosis.proof}." if sentence else ""
+    by = "With it," if len(found) == 1 else "With them,"
+    corrected = any(e.correction for e in found)
+    volume = (
+        "The chamber's volume is not known. The recording determines the time constant and "
+        "the conductance per volume; the conductance itself holds only for the placeholder "
+        "volume of the rig file."
+    )
+    return _joined(
+        f"{_opening(diagnosis, found, 'the model leaves out')}: {listed(effects)}.",
+        diagnosis.where.text if leads.group.effects else "",
+        # with a correction, what the model misses with both is reported there
+        "" if corrected else mended_sentence(diagnosis, by),
+        volume if unknown_volumes(case.rig) else "",
+    )
 
 
 def _mistaken(diagnosis: Findings) -> str:
@@ -131,39 +132,29 @@ def _mistaken(diagnosis: Findings) -> str:
     # the error is that of the model with everything that was found
     addition = " with all that was found" if len(diagnosis.answer.named) > 1 else ""
     for wrong in found:
-        mended = {
-            channel: e for channel, e in wrong.held_out.items() if e.after < _MENDED * e.refit
-        }
-        errors_of = mended or wrong.held_out
-        errors = "; ".join(
+        mended = {c: e for c, e in wrong.held_out.items() if e.after < _MENDED * e.refit}
+        errors = [
             f"the {spoken_name(channel)} is then missed{addition} by "
-            f"{_instead(e.after, e.refit, unit_of(channel))}, which values inside the tolerances "
-            "leave"
-            for channel, e in errors_of.items()
-        )
+            f"{' instead of '.join(sized_alike([e.after, e.refit], unit_of(channel)))}, "
+            "which values inside the tolerances leave"
+            for channel, e in (mended or wrong.held_out).items()
+        ]
         sentences.append(
             f"{sentence_of(wrong)} (probability {name_chance(diagnosis, wrong.name)}, "
-            f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {diagnosis.proof} {errors}."
+            f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {diagnosis.proof} "
+            f"{'; '.join(errors)}."
         )
     return f"{_opening(diagnosis, found, 'the rig file is wrong')}: " + " ".join(sentences)
 
 
-def _instead(value: float, before: float, unit: str) -> str:
-    """One size instead of another, in one unit."""
-    shown, factor = display_unit(unit, max(value, before))
-    now, was = (format_number(v * factor, 3, unicode=False) for v in (value, before))
-    return f"{now} {shown} instead of {was} {shown}".replace("°", "deg")
-
-
 def _without_name(diagnosis: Findings, without: Sequence[Part]) -> str:
     """Sentences on what stays without a name, and where."""
-    answer = diagnosis.answer
-    if answer.named:
+    if diagnosis.answer.named:
         kept = [u for u in diagnosis.unexplained if u.verdict == "unlisted"]
-        said = [capital(kept_sentence(u)) + "." for u in kept]
+        said = [f"{capital(kept_sentence(u))}." for u in kept]
         names = " and ".join(name for p in without for name in p.group.blocks)
         said = said or [f"Nothing that was tried explains the residual in {names}."]
-        return "What stays unexplained. " + " ".join(said)
+        return _joined("What stays unexplained.", *said)
     if not any(map(searched, without)):
         return diagnosis.where.text
     outside = without[0].probability
@@ -179,14 +170,15 @@ def _without_name(diagnosis: Findings, without: Sequence[Part]) -> str:
 
 
 def _form(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
-    """What has no name, or what a named equation lacks, as a form, or why there is none."""
+    """Form of what has no name, or of what a named equation lacks, or the reason for none."""
     if forms:
         corrected = any(e.correction for e in diagnosis.effects)
         what = "What the named equations lack" if corrected else "What is missing"
-        return (
-            f"{what}, as a form without a name, which the model contains. "
-            + " ".join(forms)
-            + _closed(diagnosis, f"With {'both' if corrected else 'it'} in the model,")
+        by = "With both in the model," if corrected else "With it in the model,"
+        return _joined(
+            f"{what}, as a form without a name, which the model contains.",
+            *forms,
+            mended_sentence(diagnosis, by),
         )
     if sought:
         return "No form of it carries over to other recordings."
