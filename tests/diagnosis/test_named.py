@@ -11,7 +11,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import _scaled_for_unknown_geometry, _unknown_parameters
-from pamrs.diagnosis.__init__ import _UNKNOWN_GEOMETRY_PROBABILITY
+from pamrs.diagnosis.__init__ import _UNKNOWN_GEOMETRY_FACTOR
 from pamrs.diagnosis.evidence import BlockGroup
 from pamrs.diagnosis.next_experiment import measurable
 from pamrs.recordings import Recording
@@ -104,7 +104,7 @@ def test_no_confident_name_beside_unknown_geometry(bare: pamrs.Rig) -> None:
     chances = of_texts({"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05})
     group = BlockGroup([arm], {}, {}, [], chances, arm, {}, [arm])
     capped = by_text(
-        _scaled_for_unknown_geometry(group, _UNKNOWN_GEOMETRY_PROBABILITY).probabilities
+        _scaled_for_unknown_geometry(group, _UNKNOWN_GEOMETRY_FACTOR).probabilities
     )
     assert capped["muscle_hysteresis"] < 0.5
     assert sum(capped.values()) == pytest.approx(1.0)

@@ -190,6 +190,9 @@ def test_a_named_leak_with_another_law_is_named_with_a_form_of_what_its_equation
     assert "a flow into the chamber is missing" in leak.correction
     assert "What the named equations lack, as a form without a name" in found.text
     assert leak.correction in found.text
+    conductance = leak.parameters["conductance"]
+    assert conductance.interval is not None
+    assert conductance.interval[0] < 1e-10 < conductance.interval[1]  # the form moved it
     error = found.fit.held_out["muscle_pressure"]
     assert error.after < 3.0 * error.noise < 0.01 * error.refit
     shares = {term.kind: term.share for term in found.budget}

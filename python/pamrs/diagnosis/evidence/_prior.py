@@ -41,8 +41,8 @@ _UNSEEN_PRICE = 6.5
 _MOST_RANGE_PRICE = 4.0
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
 SHARED_ODDS = 6.0
-# share of `UNDECIDED` (decision 4) that goes to none where parameters moved, and to parameters where
-# they did not; the likelier of both gets what remains
+# share of `UNDECIDED` (decision 4) that goes to none where parameters moved, and to parameters
+# where they did not; the likelier of both gets what remains
 _NOISE_ONLY_OTHER = 0.03
 # share of unlisted: in 24 of 171 such groups physics was missing that was too small to be seen
 _NOISE_ONLY_UNLISTED = 0.14

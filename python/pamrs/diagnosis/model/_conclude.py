@@ -511,7 +511,22 @@ def _with_stated_stds(
     problem: Problem, judged: list[Judged], chosen: list[FittedHypothesis]
 ) -> list[FittedHypothesis]:
     """The fits of the groups with the standard deviations that are stated."""
-    return [with_stated_std(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
+    return [
+        _with_form_std(j, with_stated_std(problem, j.group, c))
+        for j, c in zip(judged, chosen, strict=True)
+    ]
+
+
+def _with_form_std(judged: Judged, candidate: FittedHypothesis) -> FittedHypothesis:
+    """Names with a form of what they lack: standard deviations with how far it moved each value."""
+    if judged.form is None or not judged.named:
+        return candidate
+    fitted, alone = candidate.fit, judged.named_alone.fit.values
+    std = {
+        n: math.hypot(s, fitted.values[n] - alone.get(n, fitted.values[n]))
+        for n, s in fitted.std.items()
+    }
+    return replace(candidate, fit=replace(fitted, std=std))
 
 
 def _merged_rig(nominal: Rig, candidates: list[FittedHypothesis]) -> Rig:
