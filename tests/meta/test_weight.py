@@ -27,7 +27,7 @@ PACKAGES = {
     "design": 530,
     "diagnosis": 11156,
     "effects": 404,
-    "experiments": 1052,
+    "experiments": 1074,
     "findings": 949,
     "fit": 2936,
     "library": 71,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27868,
+    "tests": 27874,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1233,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37281
+MOST = 37303
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -8,7 +8,9 @@ one is moved while the others are held, or all are moved at once, none as anothe
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +25,10 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, simulate
 
+# times the highest pressure that was recorded, to which a simulated experiment may overshoot
+_ABOVE = 1.05
+_LOWERED = 0.98  # times as much lower as it overshoots: what is left of that stays
+_MOST_LOWERED = 4  # plans of an experiment that overshoots, each lower than the one before
 _SAMPLE_TIME = 0.005  # [s] sample time of an experiment where no recording tells
 _LEAST_SAMPLE_TIME = 0.002  # [s] shortest sample time
 _SEALED_SAMPLE_TIME = 0.1  # [s] sample time for a chamber without a valve, which changes slowly
@@ -163,12 +169,27 @@ def library(
         if only is not None and name not in only and name.partition(".")[0] not in only:
             continue
         try:
-            found = maker()
-            if found is not None and not _exceeds(found, rig):
-                out.append(found)
+            found = _below(name, maker, make)
         except SimulationError:
             continue  # the model does not hold there: nothing to propose to anyone
+        out += [] if found is None else [found]
     return out
+
+
+def _below(name: str, maker: Callable[[], Experiment | None], make: Maker) -> Experiment | None:
+    """Experiment whose pressures stay below what they may reach, in simulation: one that overshoots
+    is planned lower by as much; None where there is none.
+    """
+    tops = _tops(make.rig, make.highest)
+    lower = dict(tops)
+    for _ in range(_MOST_LOWERED):
+        found = maker()
+        over = 0.0 if found is None else _overshoot(found, make.rig, tops)
+        if over <= 1.0:
+            return found
+        lower = {n: _LOWERED * top / over for n, top in lower.items()}
+        maker = dict(replace(make, highest=lower).makers())[name]
+    return None
 
 
 def experiments_of(
@@ -208,14 +229,22 @@ def experiments_of(
     return library(rig, rates, sample_time=step, highest=limits or None, seen=shown, only=only)
 
 
-def _exceeds(experiment: Experiment, rig: Rig) -> bool:
-    """True where an experiment, simulated, exceeds the largest pressure of ``[limits]``: commands
-    overshoot where the valve is far open.
+def _tops(rig: Rig, highest: float | Mapping[str, float] | None) -> dict[str, float]:
+    """Gauge pressures that commands may reach in simulation [Pa], by the names of the chains."""
+    names = [chain.name for chain in chains_of(rig)]
+    given = highest if isinstance(highest, Mapping) else dict.fromkeys(names, highest)
+    most = rig.limits.get("max_pressure", math.inf)
+    tops = {n: min(most, math.inf if p is None else _ABOVE * p) for n, p in given.items()}
+    return {name: top for name, top in tops.items() if math.isfinite(top)}
+
+
+def _overshoot(experiment: Experiment, rig: Rig, tops: Mapping[str, float]) -> float:
+    """Highest pressure of a simulated experiment, as a multiple of what it may reach, from when it
+    is first below that: commands overshoot where the valve is far open. 0 where nothing is.
     """
-    most = rig.limits.get("max_pressure")
-    if most is None:
-        return False
+    if not tops:
+        return 0.0
     found = experiment.simulate(rig)
-    behind = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
-    moved = {chain.pressure for chain in chains_of(rig)} or behind
-    return any(bool(found[name].max() > most) for name in moved)
+    courses = {chain.name: found[chain.pressure] for chain in chains_of(rig)}
+    later = {n: courses[n][np.logical_or.accumulate(courses[n] <= top)] for n, top in tops.items()}
+    return max(float(later[n].max(initial=0.0)) / top for n, top in tops.items())
