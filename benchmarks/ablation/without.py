@@ -22,7 +22,7 @@ _EVIDENCE = "pamrs.diagnosis.evidence"
 WEIGHTS: dict[str, dict[str, Any]] = {
     "more of the evidence counts near the noise": {"_posterior._tempering": lambda *_: 0.02},
     "forms of equations err": {"_posterior._FORM_ERROR": 1e-6},
-    "a missed name leaves little": {"_posterior._odds_of_form": lambda taken: taken},
+    "a missed name leaves little": {"_posterior._odds_of_form": lambda taken, _: taken},
     "noise levels err": {"_posterior._LEAST_ERROR": 1e-6},
     "a right name may be missed": {"_posterior.MISSED_ODDS": 0.0},
     "physics without a name costs": {"_posterior.UNLISTED_PRICE": 0.0},

@@ -103,9 +103,7 @@ def test_no_confident_name_beside_unknown_geometry(bare: pamrs.Rig) -> None:
     arm = blocks_of(bare, measurable(bare))["arm.elbow"]
     chances = of_texts({"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05})
     group = BlockGroup([arm], {}, {}, [], chances, arm, {}, [arm])
-    capped = by_text(
-        _scaled_for_unknown_geometry(group, _UNKNOWN_GEOMETRY_FACTOR).probabilities
-    )
+    capped = by_text(_scaled_for_unknown_geometry(group, _UNKNOWN_GEOMETRY_FACTOR).probabilities)
     assert capped["muscle_hysteresis"] < 0.5
     assert sum(capped.values()) == pytest.approx(1.0)
     assert capped["unlisted"] > 0.5

@@ -21,13 +21,13 @@ ROOT = Path(__file__).parents[2]
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
     ".": 1109,
-    "campaigns": 1150,
+    "campaigns": 1151,
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11156,
+    "diagnosis": 11161,
     "effects": 404,
-    "experiments": 1074,
+    "experiments": 1078,
     "findings": 949,
     "fit": 2936,
     "library": 71,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1233,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37303
+MOST = 37313
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -223,7 +223,8 @@ class _Work:
         missing, else none.
         """
         found, proven = self.found, len(self.before) + len(self.folder.played) > 1
-        if found is not None and (not found.answer.settled or (proven and not is_healthy(found))):
+        open_ = found is not None and not found.answer.settled and found.answer.why != "name"
+        if open_ or (found is not None and proven and not is_healthy(found)):
             return {}
         if self.folder.shows is None:
             self.say("what experiments would show")

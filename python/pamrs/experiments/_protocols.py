@@ -124,7 +124,8 @@ def library(
     sample_time : float, optional
         Time between samples [s].
     highest : float or mapping of str to float, optional
-        Gauge pressure that is not to be exceeded [Pa], of several chains by their names.
+        Gauge pressure to which experiments are planned [Pa], of several chains by their names; a
+        simulated one may overshoot it by a twentieth.
     seen : Seen, optional
         What recordings showed a load frame to do; what a plain machine can by default.
     only : collection of str, optional
@@ -180,15 +181,19 @@ def _below(name: str, maker: Callable[[], Experiment | None], make: Maker) -> Ex
     """Experiment whose pressures stay below what they may reach, in simulation: one that overshoots
     is planned lower by as much; None where there is none.
     """
-    tops = _tops(make.rig, make.highest)
-    lower = dict(tops)
+    # a load frame's ranges follow from the pressures that it was made for
+    tops = _tops(make.rig, None if make.frame is not None else make.highest)
+    lower = {n: top / _ABOVE for n, top in tops.items()}
     for _ in range(_MOST_LOWERED):
         found = maker()
         over = 0.0 if found is None else _overshoot(found, make.rig, tops)
-        if over <= 1.0:
-            return found
+        if over <= 1.0 or make.frame is not None:
+            return found if over <= 1.0 else None
         lower = {n: _LOWERED * top / over for n, top in lower.items()}
-        maker = dict(replace(make, highest=lower).makers())[name]
+        try:
+            maker = dict(replace(make, highest=lower).makers())[name]
+        except DiagnosisError:  # so low nothing is worth moving
+            return None
     return None
 
 
@@ -240,11 +245,14 @@ def _tops(rig: Rig, highest: float | Mapping[str, float] | None) -> dict[str, fl
 
 def _overshoot(experiment: Experiment, rig: Rig, tops: Mapping[str, float]) -> float:
     """Highest pressure of a simulated experiment, as a multiple of what it may reach, from when it
-    is first below that: commands overshoot where the valve is far open. 0 where nothing is.
+    is first below that (of what the rig file allows, always): commands overshoot where the valve is
+    far open. 0 where nothing says how far it may go.
     """
     if not tops:
         return 0.0
     found = experiment.simulate(rig)
     courses = {chain.name: found[chain.pressure] for chain in chains_of(rig)}
     later = {n: courses[n][np.logical_or.accumulate(courses[n] <= top)] for n, top in tops.items()}
-    return max(float(later[n].max(initial=0.0)) / top for n, top in tops.items())
+    highest = max(float(course.max()) for course in courses.values())
+    shares = [float(later[n].max(initial=0.0)) / top for n, top in tops.items()]
+    return max(highest / float(rig.limits.get("max_pressure", math.inf)), *shares)

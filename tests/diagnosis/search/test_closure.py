@@ -188,7 +188,7 @@ def test_a_named_leak_with_another_law_is_named_with_a_form_of_what_its_equation
     answer, (leak,) = found.answer, found.effects
     assert (answer.named, answer.settled, answer.missed) == (["leak_muscle"], True, [])
     assert "a flow into the chamber is missing" in leak.correction
-    assert "What the named equations lack, as a form without a name" in found.text
+    assert "What the named equations lack, as a form, which" in found.text
     assert leak.correction in found.text
     conductance = leak.parameters["conductance"]
     assert conductance.interval is not None

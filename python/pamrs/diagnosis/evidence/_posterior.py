@@ -88,11 +88,13 @@ def posterior(
     usual = {h: scores[h] + rare[h] for h in rare}
     best = max(usual.values(), default=0.0)
     alike = {h: math.exp(max(-60.0, score - best)) for h, score in usual.items()}
+    size = math.sqrt(sum(start.likelihood()[b.name].size ** 2 for b in compared))
+    least = _LEAST_ERROR / max(size, _LEAST_ERROR)
     missed = MISSED_ODDS * weights[UNLISTED] / max(sum(alike.values()), 1.0)
     for candidate in named:
         key = candidate.hypothesis
         lost = rare[key] + prior.settings.further_price * (len(candidate.terms) - 1)
-        form = _odds_of_form(_share_taken(candidate, start, compared))
+        form = _odds_of_form(_share_taken(candidate, start, compared), least)
         weights[key] += missed * alike[key] * form * math.exp(-lost)
     total = sum(weights.values())
     out = {h: weight / total for h, weight in weights.items()}
@@ -114,12 +116,12 @@ def _share_taken(
     return min(1.0, max(0.0, 1.0 - after / before)) if before > 0.0 else 0.0
 
 
-def _odds_of_form(taken: float) -> float:
+def _odds_of_form(taken: float, least: float) -> float:
     """Odds of a missed name by the share of power that it takes: more than that share where it
     leaves an amplitude as forms of right names that err do (log-normal), of which the best name for
-    other physics leaves any share, each as probable.
+    other physics leaves any share, each as probable. No smaller one than `least` is known.
     """
-    left = max(math.sqrt(1.0 - taken), _FORM_ERROR * math.exp(-(SIZE_SPREAD**2)))
+    left = max(math.sqrt(1.0 - taken), least, _FORM_ERROR * math.exp(-(SIZE_SPREAD**2)))
     far = math.log(left / _FORM_ERROR) / SIZE_SPREAD
     density = math.exp(-0.5 * far**2) / (math.sqrt(2.0 * math.pi) * SIZE_SPREAD * left)
     return taken * max(1.0, density)

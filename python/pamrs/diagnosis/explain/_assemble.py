@@ -303,7 +303,10 @@ def _effects(
     """
     named: dict[Term, tuple[float, FittedHypothesis]] = {}
     corrections = {
-        effect: forms.get(j.group.blocks[0].name, "") for j in judged for effect in j.named
+        effect: forms.get(j.group.blocks[0].name, "")
+        for j in judged
+        for effect in j.named
+        if j.form is not None
     }
     chosen = [j.chosen for j in judged]
     owners = owners_of_effects(chosen)

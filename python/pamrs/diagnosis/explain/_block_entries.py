@@ -168,7 +168,7 @@ def unexplained(
             stage, problem, residual, role = shown
             error = errors[role][mismatch.channel]
             size = error[stage]
-            share, interval = _share_unexplained(mismatch.block, terms)
+            share, interval = _share_unexplained(mismatch.block, terms, entry.verdict)
             entries_found.append(
                 Unexplained(
                     mismatch.block,
@@ -206,11 +206,14 @@ def _stage_with_excess(
 
 
 def _share_unexplained(
-    block: str, terms: list[BudgetTerm]
+    block: str, terms: list[BudgetTerm], verdict: str
 ) -> tuple[float | None, list[float] | None]:
-    """Share of a block's excess that no name takes, and its interval; None without a budget."""
+    """Share of a block's excess that no name takes, nor the correction of one, and its interval;
+    None without a budget.
+    """
     of_block = [t for t in terms if t.block == block]
-    rest = [t for t in of_block if t.kind in ("form", "unexplained")]
+    kinds = ("form", "unexplained") if verdict == "unlisted" else ("unexplained",)
+    rest = [t for t in of_block if t.kind in kinds]
     if not rest:
         return None, None
     share = sum(t.share for t in rest)

@@ -519,7 +519,7 @@ def _with_stated_stds(
 
 def _with_form_std(judged: Judged, candidate: FittedHypothesis) -> FittedHypothesis:
     """Names with a form of what they lack: standard deviations with how far it moved each value."""
-    if judged.form is None or not judged.named:
+    if judged.form is None or not judged.named or candidate.effects != judged.form.effects:
         return candidate
     fitted, alone = candidate.fit, judged.named_alone.fit.values
     std = {

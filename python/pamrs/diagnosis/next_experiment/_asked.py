@@ -278,8 +278,7 @@ def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
     """Next experiment where no two hypotheses could be simulated."""
     answer = diagnosis.answer
     part = _first_asked(answer)
-    nameless = part is not None and part.group.verdict == "unlisted"
-    if answer.settled and not nameless:
+    if answer.settled:
         what = "answer" if not answer.named else "names" if len(answer.named) > 1 else "name"
         settled = "are settled" if what == "names" else "is settled"
         text = f"The {what} {settled} by these recordings; no further one is needed."
@@ -294,7 +293,8 @@ def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
     missed = [own.block for own in answer.missed if own.block in part.group.blocks]
     name = next(iter([*missed, part.block]))
     block = next((b for b in asked.blocks if b.name == name), asked.blocks[-1])
-    begin = "The name is settled. " if answer.named and answer.settled else ""
+    sure = not answer.missed and all(own.sure for own in answer.parts)
+    begin = "The name is settled. " if answer.named and sure else ""
     return asked.answer(f"{begin}For the {spoken_name(block.name)}", block, terms)
 
 

@@ -309,7 +309,11 @@ class Attempts:
         )
 
     def fit_form(
-        self, base: FittedHypothesis, blocks: list[Block], say: Callable[[str], None]
+        self,
+        base: FittedHypothesis,
+        inflation: dict[str, float],
+        blocks: list[Block],
+        say: Callable[[str], None],
     ) -> FittedHypothesis | None:
         """Fit a form of what a baseline leaves of some blocks, or names, which are refitted with
         it; None where there is none, or the model cannot be run with it.
@@ -319,7 +323,7 @@ class Attempts:
                 self.fit_problem,
                 self.nominal,
                 base.fit,
-                self.inflation_of(base.fit),
+                inflation,
                 blocks,
                 say,
                 self.noise_level,

@@ -365,29 +365,31 @@ def _add_form(group: BlockGroup, refit: Refit, say: Say, tell: Say) -> BlockGrou
     attempts, base = refit.attempts, refit.start
     # what is missing in a chamber is missing in the temperature of its gas too
     suspects = [b for b in attempts.suspects if b.kind != "temperature"] or attempts.suspects
-    leading = _leading(group.probabilities)
-    if leading.terms:
+    if len({b.kind for b in suspects}) < len(suspects):
+        return group  # of two chambers one form would have to serve both
+    leading, inflation = _leading(group.probabilities), refit.inflation
+    corrects = bool(leading.terms) and group.probabilities[UNLISTED] < _FROM_PROBABILITY
+    if corrects:
         base = next(c for c in group.candidates if c.hypothesis == leading)
+        inflation = attempts.inflation_of(base.fit)
         left = base.held_out_excess
         suspects = [b for b in suspects if left[b.name].systematic > MOST_MISSED]
-        if base.wrong or base.fit.events is not None:
+        if base.wrong or base.fit.events is not None or not suspects:
             return group
     elif group.probabilities[UNLISTED] < _FROM_PROBABILITY:
         return group
-    if not suspects or len({b.kind for b in suspects}) < len(suspects):
-        return group  # of two chambers one form would have to serve both
     if any(b.closure is None for b in suspects):
         tell(
             "no form of what is missing is looked for, since that of a load, of a force, of a "
             "temperature or of a valve in front of a line is not in the simulator"
         )
         return group
-    group = replace(group, sought=True)
-    form = attempts.fit_form(base, suspects, say)
+    group = replace(group, sought=not corrects)
+    form = attempts.fit_form(base, inflation, suspects, say)
     # what does not carry over to recordings that were held out is no form of anything
     if form is None or share_left(form, base, suspects) > 1.0 - FURTHER_SHARE:
         return group
-    if leading.terms:
+    if corrects:
         by_name, by_both = (share_left(c, refit.start, suspects) for c in (base, form))
         absent = is_absent(form, attempts.settings.most_tolerances)
         if absent or by_name - by_both > 1.0 - by_name:

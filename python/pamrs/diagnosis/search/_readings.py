@@ -237,19 +237,19 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
         if was.cost - now.cost < least * max(1.0, after) or not _is_noise(reread, now, levels):
             return None
         inflation = inflation_of(reread, now, levels)
-        was, now, far = (
-            thorough(read, nominal, inflation, start)
+        none, listed, far = (
+            thorough(read, nominal, inflation, start).cost
             for read, start in ((problem, was), (reread, now), (beyond, now))
         )
-        if was.cost - now.cost < least:
+        if none - listed < least:
             return None
     except SimulationError:
         return None
     # a parabola through none, the factor and its square, in steps of the factor
-    bend = was.cost - 2.0 * now.cost + far.cost
+    bend = none - 2.0 * listed + far
     if bend <= 0.0:
         return None
-    best = 0.5 + (was.cost - now.cost) / bend
+    best = 0.5 + (none - listed) / bend
     std = math.sqrt(0.5 / bend)
     step = math.log(reading.factors[0])
     gain = math.exp(step * best)

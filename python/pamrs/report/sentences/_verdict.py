@@ -170,18 +170,23 @@ def _without_name(diagnosis: Findings, without: Sequence[Part]) -> str:
 
 
 def _form(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
-    """Form of what has no name, or of what a named equation lacks, or the reason for none."""
-    if forms:
-        corrected = any(e.correction for e in diagnosis.effects)
-        what = "What the named equations lack" if corrected else "What is missing"
-        by = "With both in the model," if corrected else "With it in the model,"
-        return _joined(
-            f"{what}, as a form without a name, which the model contains.",
-            *forms,
-            mended_sentence(diagnosis, by),
-        )
-    if sought:
-        return "No form of it carries over to other recordings."
-    if case.rig.model["load"]:
-        return "No form of it was searched for: the simulator has none for a load yet."
-    return ""
+    """Form of what has no name, and of what named equations lack, or the reason for none."""
+    corrections = {e.correction for e in diagnosis.effects}
+    lacking = [form for form in forms if form in corrections]
+    rest = [form for form in forms if form not in corrections]
+    nameless = any(p.group.verdict == "unlisted" for p in diagnosis.answer.parts)
+    none = ""
+    if nameless and not rest and sought:
+        none = "No form of it carries over to other recordings."
+    elif nameless and not rest and case.rig.model["load"]:
+        none = "No form of it was searched for: the simulator has none for a load yet."
+    return _joined(
+        "What the named equations lack, as a form, which the model contains." if lacking else "",
+        *lacking,
+        "What is missing, as a form without a name, which the model contains." if rest else "",
+        *rest,
+        mended_sentence(diagnosis, f"With {'this' if lacking else 'it'} in the model,")
+        if forms
+        else "",
+        none,
+    )
