@@ -29,7 +29,7 @@ MODEL, TOLERANCE, SHOULDER = nominal("shoulder")
 SETTING = Setting(recordings=1, duration=6.0)
 QUICK = Lab(100, 16)
 #: of the specs of 72 cases of the second plan, seed 11501
-DIGEST = "5829defd93b8f15d0b728e20563500f955bddf0ca0c08083d58e6c0f3bb68e9c"
+DIGEST = "dfd979b03d87580cc38fe844648ffe672eddccf69a41ffb964df8b8ae693d821"
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +53,12 @@ def test_a_case_is_the_same_however_many_are_made(plan):
 
 
 def test_the_second_plan_stays_as_it_was():
-    """Its manifests are published: this digest was taken before there was a third plan."""
-    told = json.dumps([s.to_dict() for s in specs(11501, 3 * ROUND)], sort_keys=True)
+    """Its manifests are published. Numbers are rounded: the last bit of an exponential is that of a
+    machine's library.
+    """
+    every = json.dumps([s.to_dict() for s in specs(11501, 3 * ROUND)])
+    rounded = json.loads(every, parse_float=lambda text: float(f"{float(text):.9g}"))
+    told = json.dumps(rounded, sort_keys=True)
     assert hashlib.sha256(told.encode()).hexdigest() == DIGEST
     assert {s.rig for s in specs(11501, ROUND)} == set(RIGS) - {PAIR}
 
