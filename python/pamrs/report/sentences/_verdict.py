@@ -71,7 +71,7 @@ def verdict(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) 
     paragraphs = [
         _joined(*main, unsettled_sentence(diagnosis)),
         "" if leads else unexplained,
-        _form(diagnosis, case, forms, sought=sought) if without or forms else "",
+        _form(diagnosis, case, forms, sought=sought, nameless=bool(without)),
         *(f"{capital(words)}." for words in not_judged_words(diagnosis)),
     ]
     return "\n\n".join(filter(None, paragraphs))
@@ -169,12 +169,13 @@ def _without_name(diagnosis: Findings, without: Sequence[Part]) -> str:
     return text + (f" Closest: {tried}." if tried else "")
 
 
-def _form(diagnosis: Findings, case: Case, forms: list[str], *, sought: bool) -> str:
+def _form(
+    diagnosis: Findings, case: Case, forms: list[str], *, sought: bool, nameless: bool
+) -> str:
     """Form of what has no name, and of what named equations lack, or the reason for none."""
     corrections = {e.correction for e in diagnosis.effects}
     lacking = [form for form in forms if form in corrections]
     rest = [form for form in forms if form not in corrections]
-    nameless = any(p.group.verdict == "unlisted" for p in diagnosis.answer.parts)
     none = ""
     if nameless and not rest and sought:
         none = "No form of it carries over to other recordings."
