@@ -244,21 +244,20 @@ def _other(case: _Case, arm: str) -> None:
         case.keep(arm, count, found, total)
 
 
-def run_arm(given: tuple[Path, Spec, str]) -> str:
-    """One arm of one case, as far as it is not there."""
-    out, spec, arm = given
+def run_case(given: tuple[Path, Spec]) -> str:
+    """All arms of one case, as far as they are not there."""
+    out, spec = given
     case = _Case(out, spec)
-    if arm == ARMS[0]:
-        _campaign(case)
-    else:
+    _campaign(case)
+    for arm in ARMS[1:]:  # they are as long as the first
         _other(case, arm)
-    return f"{spec.name}, {arm}"
+    return spec.name
 
 
 def trial_of_campaigns(
     out: Path, wanted: Sequence[Spec], jobs: int, say: Callable[[str], None]
 ) -> None:
-    """Write keys, digests and free logs, then run every case, arm by arm; what is there is kept."""
+    """Write keys, digests and free logs, then run every case in all arms; what is there is kept."""
     manifest = out / MANIFEST
     digests: dict[str, str] = {}
     if manifest.is_file():
@@ -274,11 +273,10 @@ def trial_of_campaigns(
         write(out / "keys" / f"{spec.name}.json", made.key)
         store(made, out / "cases")
         say(f"{spec.name}: concealed")
-    for arm in ARMS:  # the others are as long as the first
-        work = [(out, spec, arm) for spec in wanted]
-        with multiprocessing.get_context("spawn").Pool(min(jobs, len(work))) as pool:
-            for name in pool.imap_unordered(run_arm, work):
-                say(f"{name}: done")
+    work = [(out, spec) for spec in wanted]
+    with multiprocessing.get_context("spawn").Pool(min(jobs, len(work))) as pool:
+        for name in pool.imap_unordered(run_case, work):
+            say(f"{name}: done")
 
 
 def is_right(key: dict[str, Any], result: dict[str, Any]) -> bool:

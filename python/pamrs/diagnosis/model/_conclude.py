@@ -423,8 +423,9 @@ def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residua
 def _models_of(
     judged: list[Judged], probabilities: dict[Hypothesis, float], nominal: Rig, problem: Problem
 ) -> list[tuple[str, Rig, float]]:
-    """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a
-    name; those of an effect with times of its own can predict no other recording.
+    """The likely hypotheses that have a model, as fitted, with the form of what their names lack
+    where it was fitted, the refitted baseline where nothing has a name; those of an effect with
+    times of its own can predict no other recording.
     """
     likely, least = [], problem.settings.simulated_from
     healthy = {h.rest: p for h, p in probabilities.items() if h in (NONE, PARAMETERS)}
@@ -447,7 +448,9 @@ def _models_of(
         if any(c.fit.events is not None for c in chosen):
             continue
         if {term for c in chosen for term in c.terms} == wanted:
-            likely.append((str(hypothesis), model(chosen), p))
+            pairs = zip(judged, chosen, strict=True)
+            corrected = [j.form or c if c is j.named_alone else c for j, c in pairs]
+            likely.append((str(hypothesis), model(corrected), p))
     return likely
 
 
