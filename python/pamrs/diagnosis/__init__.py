@@ -37,11 +37,12 @@ from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     NOISE_STDS,
     Block,
+    CheckedCase,
     Prepared,
-    Ready,
     Unjudged,
     averaged_to_need,
     blocks_with_tanks,
+    check_case,
     check_sense,
     left_out,
     notes_on_beginnings,
@@ -49,7 +50,6 @@ from pamrs.diagnosis.prepare import (
     notes_on_slack,
     notes_on_tanks,
     prepare,
-    readied,
     tanks_without_gauge,
     unjudged_blocks,
     with_own_values,
@@ -219,46 +219,52 @@ def diagnose(
     say("reading the case", 0.0)
     case = _case_of(case, data, rig, allow_outside=allow_outside)
     chosen = DiagnosisSettings() if settings is None else settings
-    ready = readied(case, chosen)
-    case = ready.case
+    checked = check_case(case, chosen)
+    case = checked.case
     considered = _checked_suspicions(case.rig, consider)
     with _in_range(case.name):
-        diagnosis, ready = _answer_without_unfollowed(ready, chosen, considered, say)
+        diagnosis, checked = _answer_without_unfollowed(checked, chosen, considered, say)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     say(f"{case.name}: done", 1.0)
     return replace(
         diagnosis,
-        faulty=ready.faulty,
+        faulty=checked.faulty,
         inputs=dict(case.inputs),
         seconds=round(time.perf_counter() - began, 3),
     )
 
 
 def _answer_without_unfollowed(
-    ready: Ready, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...], say: Steps
-) -> tuple[Diagnosis, Ready]:
+    checked: CheckedCase,
+    settings: DiagnosisSettings,
+    considered: tuple[Hypothesis, ...],
+    say: Steps,
+) -> tuple[Diagnosis, CheckedCase]:
     """Diagnose a case without recordings that its model cannot follow; return that case too."""
     try:
-        return _diagnosis_of_ready_case(ready, settings, considered, say), ready
+        return _diagnosis_of_checked_case(checked, settings, considered, say), checked
     except Unfollowed as error:
         unfollowed = error
     why = f"the model cannot follow it ({unfollowed})"
-    case, notes = left_out(ready.case, {unfollowed.recording: why})
+    case, notes = left_out(checked.case, {unfollowed.recording: why})
     if not notes:
         raise unfollowed
-    rest = replace(ready, case=case, suspected=[*notes, *ready.suspected])
+    rest = replace(checked, case=case, suspected=[*notes, *checked.suspected])
     return _answer_without_unfollowed(rest, settings, considered, say)
 
 
-def _diagnosis_of_ready_case(
-    ready: Ready, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...], say: Steps
+def _diagnosis_of_checked_case(
+    checked: CheckedCase,
+    settings: DiagnosisSettings,
+    considered: tuple[Hypothesis, ...],
+    say: Steps,
 ) -> Diagnosis:
     """Diagnosis of a case that passed the checks before any fit: as one of another unit where one
     explains what the model misses, else of its physics.
     """
-    case = ready.case
-    shortened, counts = averaged_to_need(case.recordings, ready.blocks, case.name, settings)
+    case = checked.case
+    shortened, counts = averaged_to_need(case.recordings, checked.blocks, case.name, settings)
     case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings", _JUDGED[0] / 2)
     fit_problem, held_out_problem, unjudged, start_notes = _problems(case, settings, considered)
@@ -285,15 +291,15 @@ def _diagnosis_of_ready_case(
         fit_problem = judged
     # the first few are all that a terminal shows: first what may make the answer wrong
     # a unit that is found settles what was doubted under the one that was said
-    doubts = ready.doubts if misread is None else []
+    doubts = checked.doubts if misread is None else []
     warnings = [
         *fit_problem.losses.sentences,
-        *ready.suspected,
+        *checked.suspected,
         *doubts,
         *start_notes,
-        *ready.notes,
+        *checked.notes,
     ]
-    warnings += [*diagnosis.warnings, *ready.masked, *moved]
+    warnings += [*diagnosis.warnings, *checked.masked, *moved]
     values_of = {
         p.recording.name: p.recording.parameters
         for p in (*fit_problem.recordings, *held_out_problem.recordings)
@@ -522,15 +528,15 @@ def missing_input(
     '0.98 N m against the motion'
     """
     chosen = DiagnosisSettings() if settings is None else settings
-    ready = readied(_case_of(case, recordings, rig, allow_outside=allow_outside), chosen)
-    name = ready.case.name
-    shortened, _ = averaged_to_need(ready.case.recordings, ready.blocks, name, chosen)
+    checked = check_case(_case_of(case, recordings, rig, allow_outside=allow_outside), chosen)
+    name = checked.case.name
+    shortened, _ = averaged_to_need(checked.case.recordings, checked.blocks, name, chosen)
     with _in_range(name):
         fit_problem, held_out_problem, _, _ = _problems(
-            replace(ready.case, recordings=shortened), chosen, ()
+            replace(checked.case, recordings=shortened), chosen, ()
         )
         fit_problem, held_out_problem, _ = _with_offsets(
-            fit_problem, held_out_problem, ready.case.rig
+            fit_problem, held_out_problem, checked.case.rig
         )
         roles = _by_role(fit_problem, held_out_problem)
         every = _all_recordings(fit_problem, held_out_problem)

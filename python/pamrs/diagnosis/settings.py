@@ -243,7 +243,7 @@ class DiagnosisSettings:
         "price of a parameter of an effect",
         "docs/decisions/0014: tuned on seed 501",
     )
-    further_price: float = _setting(
+    name_price: float = _setting(
         3.0,
         "log odds",
         "price of each effect and each wrong parameter",

@@ -17,7 +17,7 @@ from pamrs._files import MOST_NAME, found_outside, is_inside, parse_toml, read_t
 from pamrs._writing import write_atomically
 from pamrs.channels import channel_of
 from pamrs.diagnosis import Diagnosis, DiagnosisSettings
-from pamrs.diagnosis.prepare import readied
+from pamrs.diagnosis.prepare import check_case
 from pamrs.diagnosis.result import load_result
 from pamrs.errors import CaseError, PamrsError, ParameterError
 from pamrs.recordings import Case, LogProposal, Proposal, channels_of, load_case, propose
@@ -508,8 +508,8 @@ def checked(case: Case) -> CheckedCase:
     DiagnosisError
         If units or columns cannot be right, or no block of the rig can be judged.
     """
-    ready = readied(case, DiagnosisSettings())
-    cautions = [*case.rig.cautions, *ready.suspected, *ready.doubts, *_issues(case)]
+    checked = check_case(case, DiagnosisSettings())
+    cautions = [*case.rig.cautions, *checked.suspected, *checked.doubts, *_issues(case)]
     return CheckedCase("", list(dict.fromkeys(cautions)), dict(case.inputs))
 
 

@@ -105,7 +105,7 @@ def test_room_beside_is_what_a_perfect_companion_could_gain() -> None:
     rooms = [possible_gain(hypothesis(CREEP, left), ARM) for left in lefts]
     assert rooms[0] == pytest.approx(0.0, abs=1e-9)
     assert rooms == sorted(rooms)
-    least = SETTINGS.further_price + SETTINGS.parameter_price
+    least = SETTINGS.name_price + SETTINGS.parameter_price
     assert rooms[1] < least < rooms[-1]
 
 
@@ -131,7 +131,7 @@ def test_a_name_that_leaves_much_may_have_been_missed() -> None:
     assert shared == pytest.approx([1.6, 1.0, 0.4], rel=0.1)
     assert odds(weighed(hypothesis(CREEP, 0.02)), "muscle_creep") > 4.8
     both = weighed(hypothesis({**CREEP, **DAMPING}, 0.5))
-    expected = shared[1] * math.exp(-SETTINGS.further_price)
+    expected = shared[1] * math.exp(-SETTINGS.name_price)
     assert odds(both, "muscle_creep+muscle_rate_damping") == pytest.approx(expected, rel=0.1)
     two = weighed(hypothesis(DAMPING, 0.3), hypothesis(CREEP, 0.31))
     assert two["muscle_rate_damping"] > two["muscle_creep"]

@@ -13,7 +13,7 @@ import pamrs
 from pamrs.diagnosis import _problems
 from pamrs.diagnosis.fit import Fit, Problem, residuals
 from pamrs.diagnosis.noise import inflation_of, no_inflation
-from pamrs.diagnosis.prepare import readied
+from pamrs.diagnosis.prepare import check_case
 from pamrs.diagnosis.search import refitted, with_inflation
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
@@ -207,11 +207,11 @@ def test_a_recording_that_cannot_be_used_is_named_beside_others(words: str) -> N
         driven(rig, f"r{k}", "fit", 0.005, command, SHOULDER, [k], initial=start) for k in range(2)
     )
     bad = replace(UNUSABLE[words](other), name="bad")
-    ready = readied(pamrs.Case("case", rig, [good, bad], Path()), SETTINGS)
-    assert [r.name for r in ready.case.recordings] == ["r0"]
-    assert [block.name for block in ready.blocks] == ["supply", "chamber", "arm"]
-    assert ready.suspected[0].startswith("recording 'bad' is left out: ")
-    assert words in ready.suspected[0]
+    checked = check_case(pamrs.Case("case", rig, [good, bad], Path()), SETTINGS)
+    assert [r.name for r in checked.case.recordings] == ["r0"]
+    assert [block.name for block in checked.blocks] == ["supply", "chamber", "arm"]
+    assert checked.suspected[0].startswith("recording 'bad' is left out: ")
+    assert words in checked.suspected[0]
     refused = "surround any block" if "no channel" in words else words
     with pytest.raises(pamrs.DiagnosisError, match=refused):  # alone it is refused
         pamrs.diagnose(pamrs.Case("case", rig, [bad], Path()))

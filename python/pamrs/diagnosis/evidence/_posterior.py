@@ -93,7 +93,7 @@ def posterior(
     missed = MISSED_ODDS * weights[UNLISTED] / max(sum(alike.values()), 1.0)
     for candidate in named:
         key = candidate.hypothesis
-        lost = rare[key] + prior.settings.further_price * (len(candidate.terms) - 1)
+        lost = rare[key] + prior.settings.name_price * (len(candidate.terms) - 1)
         form = _odds_of_form(_share_taken(candidate, start, compared), least)
         weights[key] += missed * alike[key] * form * math.exp(-lost)
     total = sum(weights.values())

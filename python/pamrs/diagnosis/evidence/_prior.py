@@ -82,7 +82,7 @@ class Prior:
     def price(self, candidate: FittedHypothesis) -> float:
         """Log odds paid for names, parameters, events, possible places, and wrong values."""
         total = sum(self._own_price(candidate, term) for term in candidate.terms)
-        total += self.settings.further_price * len(candidate.terms) + candidate.log_places
+        total += self.settings.name_price * len(candidate.terms) + candidate.log_places
         events = candidate.fit.events
         happened = 0 if events is None else sum(len(v) for v in events.values.values())
         return total + self.settings.parameter_price * happened

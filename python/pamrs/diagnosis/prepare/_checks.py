@@ -394,7 +394,7 @@ _FEW: Final = 8
 
 
 @dataclass(frozen=True)
-class Ready:
+class CheckedCase:
     """A case that can be diagnosed.
 
     Attributes
@@ -421,7 +421,7 @@ class Ready:
     faulty: list[Faulty]
 
 
-def readied(case: Case, settings: DiagnosisSettings) -> Ready:
+def check_case(case: Case, settings: DiagnosisSettings) -> CheckedCase:
     """Ask all of :data:`CHECKS` of a case that need no prepared recordings.
 
     Raises
@@ -452,7 +452,7 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *said[checks[0].repeats]])) from error
     blocks = blocks_with_tanks(case.rig, case.channels)
-    return Ready(
+    return CheckedCase(
         case,
         blocks,
         left,
@@ -533,7 +533,7 @@ def questions(proposed: LogProposal, rig: Rig, settings: DiagnosisSettings) -> l
     Returns
     -------
     list of str
-        Why :func:`readied` would refuse it; empty for a sound log, or one without a clock.
+        Why :func:`check_case` would refuse it; empty for a sound log, or one without a clock.
     """
     found = list[str]()
     try:

@@ -385,7 +385,7 @@ def _price(candidate: FittedHypothesis, attempts: Attempts) -> float:
     events = candidate.fit.events.values.values() if candidate.fit.events else ()
     count = len(names) + sum(map(len, events))
     moved = sum(v * v for n, v in candidate.fit.moved.items() if n not in names)
-    return 0.5 * (moved + count * math.log(bins)) + attempts.settings.further_price * len(
+    return 0.5 * (moved + count * math.log(bins)) + attempts.settings.name_price * len(
         candidate.terms
     )
 

@@ -187,7 +187,7 @@ def fit_candidates(
     singles = part(what, lambda: _add_same_data(search, singles), singles)
     singles += fit_events(search, per_recording)
     # of a further effect of one parameter, which has to pay for itself
-    least = attempts.settings.further_price + attempts.settings.parameter_price
+    least = attempts.settings.name_price + attempts.settings.parameter_price
     if transient and not any(
         possible_gain(c, attempts.compared) < least for c in (*singles, *wrong_values)
     ):
