@@ -22,7 +22,16 @@ from fingerprints.sheet import (
 )
 from pamrs import Simulation, rigs, simulate
 
-__all__ = ["activation", "creep", "crowding", "damping", "drift", "hysteresis", "softening"]
+__all__ = [
+    "activation",
+    "creep",
+    "crowding",
+    "damping",
+    "drift",
+    "give",
+    "hysteresis",
+    "softening",
+]
 
 NAMES = ("without", "with the effect")
 REST = 0.276  # m, rest length of the muscle on the bench, which is that of the joint
@@ -312,6 +321,40 @@ def crowding(sheet: Sheet) -> None:
     label(
         axes["x"],
         "joint: falls short the same way up and down",
+        "muscle [bar]",
+        "angle [deg]",
+        "upper left",
+    )
+
+
+def give(sheet: Sheet) -> None:
+    """The muscle at three pressures over its stroke, by the length that the frame has and by that
+    of the muscle; the joint under a slow triangle.
+    """
+    axes = sheet.axes("fx;mx", width_ratios=[1.15, 1])
+    time = clock(20.0, 0.02)
+    wave = zigzag(time, 0.0, 0.15, over=20.0)
+    for gauge, style in ((1e5, ":"), (3e5, "--"), (5e5, "-")):
+        pair = bench(sheet, wave, gauge, 0.02)
+        for run, colour, name in zip(pair, (WITHOUT, WITH), NAMES, strict=True):
+            named = f"{name}, {gauge / BAR:g} bar"
+            of_frame = 100.0 * (1.0 - run["length"] / REST)
+            axes["f"].plot(of_frame, pull(run), style, color=colour, label=named)
+            axes["m"].plot(percent(run), pull(run), style, color=colour, label=named)
+    label(axes["f"], "by the length of muscle and tendon", "", "pull [N]", "upper right")
+    label(
+        axes["m"],
+        "by the length of the muscle: the same curves",
+        "contraction [%]",
+        "pull [N]",
+        "upper right",
+    )
+    time = clock(80.0, 0.05)
+    runs = sheet.run(supply_command=BAR * zigzag(time, 0.0, 4.5, 0.0, over=40.0), sample_time=0.05)
+    sheet.both(axes["x"], runs, angle, pressure)
+    label(
+        axes["x"],
+        "joint: falls short, more with more pull",
         "muscle [bar]",
         "angle [deg]",
         "upper left",

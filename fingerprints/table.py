@@ -198,6 +198,17 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             {"contact_area": 3e-3, "onset_contraction": 0.1},
         ),
         Experiment(
+            "tendon_give",
+            "regulated_joint",
+            (
+                "a slow triangle of the pressure; on the rig `bench` three pressures at held "
+                "lengths of muscle and tendon"
+            ),
+            "the joint falls short in proportion to the pull, the muscle alone does not",
+            muscle.give,
+            {"compliance": 1e-5},
+        ),
+        Experiment(
             "joint_coulomb_stribeck",
             "regulated_joint",
             "very slow triangles of the pressure",

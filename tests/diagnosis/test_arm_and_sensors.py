@@ -50,6 +50,7 @@ def run(rig: pamrs.Rig) -> pamrs.Simulation:
         ("valve_area", "two_areas", {"excess": 0.2}, 0.8),
         ("com_offset", "", {"angle": 0.06}, 0.5),
         ("sensor_lag", "", {"delay": 0.03}, 0.5),
+        ("tendon_give", "linear", {"compliance": 6e-6}, 0.8),
         ("parameter_drift", "exponential", {"change": -0.25, "time_constant": 8.0}, 0.5),
     ],
 )

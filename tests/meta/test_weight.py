@@ -32,7 +32,7 @@ PACKAGES = {
     "fit": 2936,
     "library": 71,
     "recordings": 5019,
-    "report": 1947,
+    "report": 1946,
     "rig": 2227,
     "rigs": 141,
     "simulation": 1095,
@@ -41,15 +41,15 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27874,
+    "tests": 27916,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
-    "trial": 5715,
+    "trial": 5714,
     "trial/tests": 1235,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37313
+MOST = 37312
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -37,7 +37,7 @@ from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     NOISE_STDS,
     Block,
-    CheckedCase,
+    DiagnosableCase,
     Prepared,
     Unjudged,
     averaged_to_need,
@@ -236,11 +236,11 @@ def diagnose(
 
 
 def _answer_without_unfollowed(
-    checked: CheckedCase,
+    checked: DiagnosableCase,
     settings: DiagnosisSettings,
     considered: tuple[Hypothesis, ...],
     say: Steps,
-) -> tuple[Diagnosis, CheckedCase]:
+) -> tuple[Diagnosis, DiagnosableCase]:
     """Diagnose a case without recordings that its model cannot follow; return that case too."""
     try:
         return _diagnosis_of_checked_case(checked, settings, considered, say), checked
@@ -255,7 +255,7 @@ def _answer_without_unfollowed(
 
 
 def _diagnosis_of_checked_case(
-    checked: CheckedCase,
+    checked: DiagnosableCase,
     settings: DiagnosisSettings,
     considered: tuple[Hypothesis, ...],
     say: Steps,

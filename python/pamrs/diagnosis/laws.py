@@ -66,8 +66,7 @@ def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:
     blocks = [b for b in problem.blocks if b.name in names]
     if len(blocks) < len(names):
         return math.inf
-    part = replace(problem, blocks=blocks)
-    return 2.0 * refitted(part, rig, no_inflation(blocks)).cost
+    return 2.0 * refitted(replace(problem, blocks=blocks), rig, no_inflation(blocks)).cost
 
 
 def is_better(other: Diagnosis, stated: Diagnosis) -> bool:

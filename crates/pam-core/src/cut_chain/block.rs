@@ -179,6 +179,9 @@ impl Block {
             places.extend(effect_states(rig, Place::Supply(supply)));
         }
         if !self.mechanical() {
+            let muscles = rig.wiring.ports.muscles.iter();
+            let gives = muscles.filter_map(|muscle| muscle.give.as_ref());
+            places.extend(gives.flat_map(|acting| own_states(layout, acting)));
             places.extend(inlets(layout, measured));
             places.extend(layout.flow(0)..layout.angle(0));
         }

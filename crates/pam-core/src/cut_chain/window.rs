@@ -314,10 +314,7 @@ impl<'a, S: Number> Cut<'a, S> {
                 };
             }
         }
-        for gas in 0..layout.gases {
-            state[layout.mass(gas)] = plant.initial_mass(gas, state);
-        }
-        plant.start_effects(state);
+        plant.start(state);
     }
 
     /// A new window keeps the gas temperature and the memory of the motion.

@@ -51,6 +51,7 @@ catalogue! {
     mullins_softening,
     parameter_drift,
     pam_crowding_contact,
+    tendon_give,
     joint_coulomb_stribeck,
     joint_end_stop,
     payload_swing,

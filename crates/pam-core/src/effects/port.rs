@@ -39,6 +39,9 @@ pub enum Port {
     Bladder,
     /// Muscle: a force of its own.
     Force,
+    /// Muscle: what gives between it and its load. One effect at most, with one state: by how much
+    /// [m].
+    Give,
     /// Joint: a torque between its two links.
     Torque,
     /// Joint: a torque from outside on its link.
@@ -74,7 +77,7 @@ impl Port {
     #[must_use]
     pub const fn states(self) -> Option<usize> {
         match self {
-            Self::Passage | Self::Reading | Self::Thermometer => Some(1),
+            Self::Passage | Self::Reading | Self::Thermometer | Self::Give => Some(1),
             Self::Hanging | Self::Mounting => Some(2),
             _ => None,
         }
@@ -463,7 +466,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         0.0
     }
 
-    /// [`Port::Mounting`]: how much a torque accelerates it [1/(kg m2)].
+    /// [`Port::Mounting`]: how much a torque accelerates it [1/(kg m2)]. [`Port::Give`]: how much a
+    /// pull stretches it at most [m/N].
     fn mobility(&self) -> f64 {
         0.0
     }

@@ -194,7 +194,7 @@ impl Rig {
                 needed(STABLE / body)
             )));
         }
-        let step = STABLE / air;
+        let step = STABLE / air.max(plant.fastest_give());
         if step < LEAST_STEP {
             return Err(Error::Model(match place {
                 Some(k) => format!(
@@ -225,6 +225,6 @@ impl Rig {
     pub(crate) fn air_step(&self, moves: impl Fn(Node) -> bool) -> Result<f64> {
         let plant = Plant::new(self, self.parameters.lift::<f64>(), false)?;
         let (rate, _) = plant.fastest_air(moves);
-        Ok(STABLE / rate.max(plant.fastest_command()))
+        Ok(STABLE / rate.max(plant.fastest_command()).max(plant.fastest_give()))
     }
 }

@@ -27,10 +27,7 @@ impl<S: Scalar> Plant<'_, S> {
     /// Contraction ratios of the muscles, without their derivatives.
     pub fn where_muscles_are(&self, state: &[S], out: &mut Vec<f64>) {
         out.clear();
-        out.extend(self.wiring.groups.iter().map(|group| {
-            let angle = state[self.layout.angle(group.coordinate)].re();
-            group.joint.eval(angle).shortening / group.rest_length
-        }));
+        out.extend((0..self.wiring.groups.len()).map(|k| self.contraction(k, state).re()));
     }
 
     /// What the sensitivities of the gases gain by the kinks between the contraction ratios at which
@@ -43,9 +40,9 @@ impl<S: Scalar> Plant<'_, S> {
         here: &Scratch<S>,
         state: &mut [S],
     ) {
-        for (was, group) in from.iter().zip(&self.wiring.groups) {
-            let angle = state[self.layout.angle(group.coordinate)];
-            let now = group.joint.eval(angle.re()).shortening / group.rest_length;
+        for (k, (was, group)) in from.iter().zip(&self.wiring.groups).enumerate() {
+            let contraction = self.contraction(k, state);
+            let now = contraction.re();
             let jump: f64 = (group.muscle.table.volume_kinks().iter())
                 .filter(|kink| (*was < kink.at) != (now < kink.at))
                 .map(|kink| if *was < now { kink.jump } else { -kink.jump })
@@ -54,8 +51,7 @@ impl<S: Scalar> Plant<'_, S> {
             if jump == 0.0 || !simulated.moves(place) {
                 continue;
             }
-            let later = group.joint.eval(angle).shortening / group.rest_length - now;
-            let change = later * (jump * group.count);
+            let change = (contraction - now) * (jump * group.count);
             let (pressure, mass) = self.swollen(gas, change, state, controls, here);
             state[place] += pressure;
             if simulated.moves(self.layout.mass(gas)) {

@@ -230,7 +230,35 @@ impl Plant<'_, f64> {
             let ratio = bodies.iter().map(ratio).fold(0.0, f64::max);
             fastest = fastest.max(effect.swing_rate(self.body.gravity(), ratio));
         }
-        fastest.max(self.fastest_effect(|place| matches!(place, Place::Group(_) | Place::Joint(_))))
+        fastest
+            .max(self.fastest_effect(|place| matches!(place, Place::Group(_) | Place::Joint(_))))
+            .max(self.fastest_give())
+    }
+
+    /// Fastest rate of what gives between a muscle and its load [1/s].
+    pub(crate) fn fastest_give(&self) -> f64 {
+        let muscles = self.wiring.ports.muscles.iter().enumerate();
+        let rate = |k: usize, give: &Acting| {
+            let effect = self.effect(give);
+            effect.fastest() * (1.0 + self.muscle_stiffness(k) * effect.mobility())
+        };
+        let rates = muscles.filter_map(|(k, m)| m.give.as_ref().map(|give| rate(k, give)));
+        rates.fold(0.0, f64::max)
+    }
+
+    /// Largest stiffness of one muscle of a group [N/m] at the highest pressure.
+    fn muscle_stiffness(&self, k: usize) -> f64 {
+        let group = &self.wiring.groups[k];
+        let gauge = Slope::from(self.rig.highest_pressure() - self.rig.gas.ambient_pressure);
+        let (low, high) = self.rig.range(group);
+        let slope = |i: u32| {
+            let share = f64::from(i) / f64::from(ARM_POINTS);
+            let contraction = Slope::new(low + (high - low) * share, 1.0);
+            let table = group.muscle.table.eval(contraction);
+            let scale = Slope::from(self.scales[k]);
+            group.muscle.pull(&table, gauge, contraction, scale).slope().abs()
+        };
+        (0..=ARM_POINTS).map(slope).fold(0.0, f64::max) / group.rest_length
     }
 
     /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest

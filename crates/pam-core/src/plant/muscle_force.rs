@@ -5,7 +5,7 @@ use super::ports::Acting;
 use super::rates::Plant;
 use super::units::Group;
 use crate::blocks::joint::JointPoint;
-use crate::effects::AtMuscle;
+use crate::effects::{At, AtMuscle};
 use crate::muscle::TablePoint;
 use crate::scalar::{constant, Scalar};
 
@@ -26,10 +26,46 @@ fn feel<S: Scalar>(acting: &Acting, force: S, felt: &mut [S]) {
 
 impl<S: Scalar> Plant<'_, S> {
     #[inline(always)]
-    pub(super) fn muscle_shape(&self, group: &Group, state: &[S]) -> MuscleShape<S> {
+    pub(super) fn muscle_shape(&self, k: usize, group: &Group, state: &[S]) -> MuscleShape<S> {
         let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
-        let contraction = point.shortening / group.rest_length;
+        let contraction = self.shortening(k, &point, state) / group.rest_length;
         MuscleShape { point, contraction, table: group.muscle.table.eval(contraction) }
+    }
+
+    /// Shortening of the muscles of a group [m]: by the motion of their load, and by what gives.
+    #[inline(always)]
+    fn shortening(&self, k: usize, point: &JointPoint<S>, state: &[S]) -> S {
+        match &self.wiring.ports.muscles[k].give {
+            Some(acting) if self.altered.gives => point.shortening + self.own(acting, state)[0],
+            _ => point.shortening,
+        }
+    }
+
+    /// Contraction ratio of a group at a state.
+    pub(crate) fn contraction(&self, k: usize, state: &[S]) -> S {
+        let group = &self.wiring.groups[k];
+        let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
+        self.shortening(k, &point, state) / group.rest_length
+    }
+
+    /// Rate [m/s] at which gives what is between the muscles of a group and their load, under the
+    /// force of all of them [N], which is written to `felt`.
+    pub(super) fn give_rate(
+        &self,
+        k: usize,
+        group: &Group,
+        state: &[S],
+        force: S,
+        felt: &mut [S],
+    ) -> S {
+        let mut rate = [constant(0.0)];
+        if let Some(acting) = &self.wiring.ports.muscles[k].give {
+            let force = force / group.count;
+            feel(acting, force, felt);
+            let at = At::Muscle(AtMuscle { force, ..self.at_group(k, state) });
+            self.effect(acting).rates(&at, self.own(acting, state), &mut rate);
+        }
+        rate[0]
     }
 
     /// Force of all muscles of a group [N]; what effects with states act on is written to `felt`.
@@ -94,7 +130,7 @@ impl<S: Scalar> Plant<'_, S> {
     ) -> S {
         let here = &self.wiring.ports.muscles[k];
         let scale = self.scales[k];
-        let mut at = self.at_muscle(group, state, point);
+        let mut at = self.at_muscle(k, group, state, point);
         at.stretched = (start - at.contraction) * group.rest_length;
         for acting in &here.gauge {
             at.gauge = self.effect(acting).gauge(at.gauge);
@@ -115,11 +151,18 @@ impl<S: Scalar> Plant<'_, S> {
     }
 
     /// What effects see of a group of muscles that have not moved since the step began.
-    fn at_muscle(&self, group: &Group, state: &[S], point: &JointPoint<S>) -> AtMuscle<S> {
+    fn at_muscle(
+        &self,
+        k: usize,
+        group: &Group,
+        state: &[S],
+        point: &JointPoint<S>,
+    ) -> AtMuscle<S> {
+        let shortening = self.shortening(k, point, state);
         AtMuscle {
             gauge: state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure,
-            contraction: point.shortening / group.rest_length,
-            length: -point.shortening + group.rest_length,
+            contraction: shortening / group.rest_length,
+            length: -shortening + group.rest_length,
             rate: -(point.moment_arm * state[self.layout.rate(group.coordinate)]),
             stretched: constant(0.0),
             force: constant(0.0),
@@ -130,14 +173,13 @@ impl<S: Scalar> Plant<'_, S> {
     pub(super) fn at_group(&self, k: usize, state: &[S]) -> AtMuscle<S> {
         let group = &self.wiring.groups[k];
         let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
-        self.at_muscle(group, state, &point)
+        self.at_muscle(k, group, state, &point)
     }
 
     /// Contraction ratio of each group at a state.
     pub fn contractions(&self, state: &[S], out: &mut [S]) {
-        for (out, group) in out.iter_mut().zip(&self.wiring.groups) {
-            *out = group.joint.eval(state[self.layout.angle(group.coordinate)]).shortening
-                / group.rest_length;
+        for (k, out) in out.iter_mut().enumerate().take(self.wiring.groups.len()) {
+            *out = self.contraction(k, state);
         }
     }
 

@@ -355,6 +355,7 @@ impl Ports {
                     acting,
                 )
             }
+            (Port::Give, Place::Group(k)) => self.muscles[k].give.replace(acting),
             (Port::Torque, Place::Joint(k)) => push(&mut self.torque[k], acting),
             (Port::Push, Place::Joint(k)) => push(&mut self.push[k], acting),
             (Port::Weight, Place::Joint(k)) => push(&mut self.weight[k], acting),

@@ -52,6 +52,7 @@ pub(crate) struct MusclePorts {
     pub gauge: Vec<Acting>,
     pub bladder: Vec<Acting>,
     pub force: Vec<Acting>,
+    pub give: Option<Acting>,
 }
 
 /// Effects by the ports at which they act, in the order in which they act there.

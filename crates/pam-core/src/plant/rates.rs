@@ -186,6 +186,8 @@ pub(super) struct Altered {
     /// Some gas has an energy balance.
     pub heats: bool,
     pub muscles: bool,
+    /// Something gives between a muscle and its load.
+    pub gives: bool,
     pub motion: bool,
 }
 
@@ -204,6 +206,7 @@ impl Altered {
             laws: ports.law.iter().any(Option::is_some),
             balances: ports.on_balance(),
             muscles: ports.muscles.iter().any(|muscle| muscle.some),
+            gives: ports.muscles.iter().any(|muscle| muscle.give.is_some()),
             motion: ports.on_motion(),
         }
     }
@@ -477,7 +480,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
             here.wall.fill(zero);
         }
         for (k, group) in self.wiring.groups.iter().enumerate() {
-            let muscle = self.muscle_shape(group, state);
+            let muscle = self.muscle_shape(k, group, state);
             let rate = state[self.layout.rate(group.coordinate)];
             here.volume[group.chamber] += muscle.table.volume * group.count;
             here.volume_rate[group.chamber] += muscle.table.volume_slope
@@ -488,6 +491,11 @@ impl<'a, S: Scalar> Plant<'a, S> {
                 let felt = &mut here.felt;
                 let force = self.muscle_force(k, group, state, &memory[k], start[k], &muscle, felt);
                 (here.contraction[k], here.force[k]) = (muscle.contraction, force);
+                if self.altered.gives {
+                    let rate = self.give_rate(k, group, state, force, &mut here.felt);
+                    here.volume_rate[group.chamber] +=
+                        muscle.table.volume_slope * rate * (group.count / group.rest_length);
+                }
                 let torque = force * muscle.point.torque_arm;
                 here.torque[group.coordinate] += torque;
                 if loads {
@@ -548,10 +556,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Volume of a gas [m3] for a state.
     pub(super) fn volume(&self, gas: usize, state: &[S]) -> S {
         let mut volume = self.fixed_volume[gas];
-        for group in self.wiring.groups.iter().filter(|g| g.chamber == gas) {
-            let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
-            volume +=
-                group.muscle.table.eval(point.shortening / group.rest_length).volume * group.count;
+        let groups = self.wiring.groups.iter().enumerate();
+        for (k, group) in groups.filter(|(_, g)| g.chamber == gas) {
+            volume += self.muscle_shape(k, group, state).table.volume * group.count;
         }
         volume
     }
@@ -588,7 +595,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Whether anybody asks what the muscles pull.
     #[inline]
     pub fn pulls(&self, simulated: &Simulated) -> bool {
-        simulated.forces || self.balanced
+        simulated.forces || self.balanced || (self.altered.gives && simulated.volumes)
     }
 
     /// Time derivative of the state; entries of driven states are zero.

@@ -3,8 +3,11 @@
 use super::ports::{Acting, Place};
 use super::rates::{Controls, Plant, Scratch, Simulated};
 use super::units::Node;
-use crate::effects::{At, AtMuscle, BAR};
+use crate::effects::{At, AtMuscle, Port, BAR};
 use crate::scalar::{constant, Scalar};
+
+/// How often a start that approaches rest is asked for.
+const APPROACHES: usize = 60;
 
 impl<S: Scalar> Plant<'_, S> {
     /// A supply or a gas.
@@ -117,18 +120,33 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// What effects remember, where a recording begins: nothing has moved for long, valves are
-    /// shut.
-    pub fn start_effects(&self, state: &mut [S]) {
+    /// What effects remember, and the masses of the gases, where a recording begins: nothing has
+    /// moved for long, valves are shut.
+    pub fn start(&self, state: &mut [S]) {
+        if self.altered.gives {
+            self.start_effects(state); // the gases have the volumes of muscles that gave
+        }
+        for gas in 0..self.layout.gases {
+            state[self.layout.mass(gas)] = self.initial_mass(gas, state);
+        }
+        self.start_effects(state);
+    }
+
+    fn start_effects(&self, state: &mut [S]) {
         let wiring = &self.wiring;
         let shut = vec![constant(0.0); wiring.valves.len()];
         let mut here = self.scratch();
         for (place, acting) in wiring.ports.all.iter().filter(|(_, acting)| acting.count > 0) {
-            if matches!(place, Place::Group(_)) {
-                self.mechanics_at_rest(state, &mut here); // with what acts before it
+            let form = wiring.ports.effects[acting.effect].form;
+            // what gives changes the force that it is at rest with
+            let times = if form.ports.contains(&Port::Give) { APPROACHES } else { 1 };
+            for _ in 0..times {
+                if matches!(place, Place::Group(_)) {
+                    self.mechanics_at_rest(state, &mut here); // with what acts before it
+                }
+                let at = self.at(*place, acting, state, &shut, &here);
+                self.effect(acting).start(&self.rig.gas, &at, self.own_mut(acting, state));
             }
-            let at = self.at(*place, acting, state, &shut, &here);
-            self.effect(acting).start(&self.rig.gas, &at, self.own_mut(acting, state));
         }
         for gas in 0..self.layout.gases {
             if let Some((reading, _)) = self.lagging(gas) {

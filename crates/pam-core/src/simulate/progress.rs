@@ -56,10 +56,7 @@ impl Progress {
     pub(crate) fn of(plant: &Plant<'_, f64>, initial: &Initial) -> Self {
         let rig = plant.rig();
         let mut state = initial.state(rig, plant.states());
-        for gas in 0..rig.layout.gases {
-            state[rig.layout.mass(gas)] = plant.initial_mass(gas, &state);
-        }
-        plant.start_effects(&mut state);
+        plant.start(&mut state);
         for (gas, kelvin) in &initial.temperatures {
             state[rig.layout.mass(*gas)] *= rig.spec().gas.temperature / kelvin;
         }

@@ -364,12 +364,12 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &[S], time: f6
             );
         }
     }
-    for (group, spec) in rig.wiring.groups.iter().zip(&rig.spec().muscles) {
+    for (k, (group, spec)) in rig.wiring.groups.iter().zip(&rig.spec().muscles).enumerate() {
         let angle = state[layout.angle(group.coordinate)].re();
         if !group.joint.reaches(angle) {
             return failure("joint_angle", angle, "an angle that the tendon reaches");
         }
-        let contraction = group.joint.eval(angle).shortening / group.rest_length;
+        let contraction = plant.contraction(k, state).re();
         let table = &group.muscle.table;
         if !table.contains(contraction) {
             let allowed =

@@ -42,6 +42,10 @@ impl Run {
         self.out.get(&self.rig, name).unwrap()
     }
 
+    fn first(&self, name: &str) -> f64 {
+        self.get(name)[0]
+    }
+
     fn last(&self, name: &str) -> f64 {
         *self.get(name).last().unwrap()
     }
@@ -528,6 +532,60 @@ fn framed(effects: Vec<EffectSpec>, back: bool) -> Vec<f64> {
 }
 
 #[test]
+fn a_tendon_that_gives_lets_its_muscle_shorten() {
+    let (c, angle) = (2e-5, 1.0);
+    let give = || vec![effect("tendon_give", &[("compliance", c), ("time_constant", 0.01)])];
+    let (soft, stiff) = (held(give(), 3e5, angle, 6), held(vec![], 3e5, angle, 6));
+    let (force, more) = (
+        soft.first("muscle_force"),
+        soft.first("contraction_ratio") - stiff.first("contraction_ratio"),
+    );
+    assert!((more * 0.276 / (c * force / 6.0) - 1.0).abs() < 1e-9);
+    assert!(force < 0.95 * stiff.first("muscle_force"));
+    // it pulls as a muscle on a stiff tendon that is as short
+    let contraction = |angle: f64| held(vec![], 3e5, angle, 1).first("contraction_ratio");
+    let (mut low, mut high) = (0.2, 1.8);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        let rises = contraction(high) > contraction(low);
+        let above = contraction(middle) > soft.first("contraction_ratio");
+        if above == rises {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    let same = held(vec![], 3e5, low, 1);
+    assert!((same.first("muscle_force") / force - 1.0).abs() < 1e-9);
+    // at rest it stays at rest, and its gas has the volume of the shorter muscle
+    let later = soft.get("muscle_pressure")[5];
+    assert!((later / soft.first("muscle_pressure") - 1.0).abs() < 1e-5);
+    assert!((soft.first("air_mass") / same.first("air_mass") - 1.0).abs() < 1e-9);
+    assert!(soft.first("air_mass") > 1.01 * stiff.first("air_mass"));
+}
+
+#[test]
+fn the_gas_of_a_muscle_on_a_tendon_that_gives_keeps_its_mass() {
+    let give = effect("tendon_give", &[("compliance", 2e-5), ("time_constant", 0.01)]);
+    let compressed = |effects: Vec<EffectSpec>| {
+        let mut spec = shoulder();
+        (spec.supplies, spec.valves) = (vec![], vec![]);
+        let start = [("muscle_pressure", 3e5), ("joint_angle", 1.2)];
+        let run = Run::new(with(spec, effects), 100, 0.01, 20, |_| 5.0, &start);
+        let (p, v) = (run.get("muscle_pressure"), run.get("air_volume"));
+        let most = v.iter().fold(0.0_f64, |most, now| most.max((now / v[0]).ln().abs()));
+        let ratio = |k: usize| ((p[k] + 101_325.0) / (p[0] + 101_325.0)).ln();
+        let slope = ratio(40) / (v[40] / v[0]).ln();
+        let gap = (0..100).map(|k| (ratio(k) - slope * (v[k] / v[0]).ln()).abs());
+        (most, slope, gap.fold(0.0, f64::max))
+    };
+    let ((moved, by_law, gap), (_, found, with_give)) =
+        (compressed(vec![]), compressed(vec![give]));
+    assert!(moved > 0.02 && gap < 1e-6, "{moved} {gap}");
+    assert!((found / by_law - 1.0).abs() < 1e-6 && with_give < 1e-6, "{found} {with_give}");
+}
+
+#[test]
 fn creep_relaxes_the_force_at_a_held_length() {
     let (k, tau) = (3e3, 0.8);
     let (creeping, free) = (
@@ -567,6 +625,7 @@ fn convergence_is_of_order_four_where_the_effect_is_smooth() {
         "valve_centre_leakage",
         "input_path_lag",
         "muscle_creep",
+        "tendon_give",
         "payload_swing",
         "base_flexibility",
     ];

@@ -409,8 +409,7 @@ def _known(models: Models) -> KnownValues:
 
 def _model_of(judged: Judged, start: FittedHypothesis) -> FittedHypothesis:
     """Candidate of a group for the model: what is named, with a form of what has no name."""
-    named = judged.chosen if judged.named or judged.wrong else start
-    return judged.form or named
+    return judged.form or (judged.chosen if judged.named or judged.wrong else start)
 
 
 def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:

@@ -394,7 +394,7 @@ _FEW: Final = 8
 
 
 @dataclass(frozen=True)
-class CheckedCase:
+class DiagnosableCase:
     """A case that can be diagnosed.
 
     Attributes
@@ -421,7 +421,7 @@ class CheckedCase:
     faulty: list[Faulty]
 
 
-def check_case(case: Case, settings: DiagnosisSettings) -> CheckedCase:
+def check_case(case: Case, settings: DiagnosisSettings) -> DiagnosableCase:
     """Ask all of :data:`CHECKS` of a case that need no prepared recordings.
 
     Raises
@@ -452,7 +452,7 @@ def check_case(case: Case, settings: DiagnosisSettings) -> CheckedCase:
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *said[checks[0].repeats]])) from error
     blocks = blocks_with_tanks(case.rig, case.channels)
-    return CheckedCase(
+    return DiagnosableCase(
         case,
         blocks,
         left,

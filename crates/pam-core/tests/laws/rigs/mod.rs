@@ -253,6 +253,11 @@ pub const TYPICAL: &[Typical] = &[
         &[("contact_area", 0.0)],
     ),
     typical(
+        "tendon_give",
+        &[("compliance", 1e-5), ("time_constant", 0.01)],
+        &[("compliance", 0.0)],
+    ),
+    typical(
         "joint_coulomb_stribeck",
         &[("stiction", 3.0), ("stribeck_speed", 0.08)],
         &[("stiction", 0.0)],
@@ -328,6 +333,12 @@ pub const FORMS: &[Typical] = &[
         "base_flexibility",
         "with_play",
         &[("compliance", 1e-4), ("natural_frequency", 8.0), ("damping_ratio", 0.3), ("play", 0.01)],
+        &[("compliance", 0.0)],
+    ),
+    formed(
+        "tendon_give",
+        "toe",
+        &[("compliance", 2e-5), ("half_force", 200.0), ("time_constant", 0.01)],
         &[("compliance", 0.0)],
     ),
     formed(
