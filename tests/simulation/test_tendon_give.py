@@ -20,7 +20,7 @@ MUSCLE = pamrs.library.pam_a_1in()
 
 @settings(max_examples=20, deadline=None)
 @given(
-    compliance=st.floats(0.0, 2e-5),
+    compliance=st.one_of(st.just(0.0), st.floats(-7.0, -3.7).map(lambda power: 10.0**power)),
     half_force=st.one_of(st.none(), st.floats(50.0, 2e3)),
     gauge=st.floats(5e4, 6e5),
     contraction=st.floats(0.0, 0.15),
@@ -42,6 +42,36 @@ def test_the_muscle_pulls_as_it_does_at_its_own_length(
     assert own == pytest.approx(contraction + stretch / rest, abs=1e-9)
     alone = max(float(MUSCLE.force(gauge, own)), 0.0)  # a slack muscle does not push
     assert pull[0] == pytest.approx(alone, rel=1e-4, abs=0.5)
+
+
+@pytest.mark.parametrize("name", ["pam_a_1in", "ch2_075in"])
+def test_it_rests_and_moves_however_soft_it_is(name: str) -> None:
+    """At rest nothing moves, also with friction and creep of the muscle; steps that the rig takes
+    for stable are: ten times shorter ones say the same.
+    """
+    muscle = getattr(pamrs.library, name)()
+    creep = {"stiffness": 1e3, "time_constant": 2.0}
+    low, high = muscle.contraction_range
+    time = np.arange(0.0, 2.0, 0.01)
+    held = muscle.parameters["rest_length"] * (1.0 - low - 0.2 * (high - low))
+    wave = held * (1.0 - 0.02 * np.sin(2.0 * np.pi * time))
+    for compliance in (1e-6, 2e-5, 2e-4):
+        rig = pamrs.rigs.bench(muscle).with_effect("muscle_creep", creep)
+        rig = rig.with_effect("tendon_give", {"compliance": compliance})
+        rest = pamrs.simulate(
+            rig, length=np.full(50, held), sample_time=0.01, initial={"muscle_pressure": 3e5}
+        )
+        np.testing.assert_allclose(rest["muscle_force"], rest["muscle_force"][0], rtol=1e-6)
+        usual, finer = (
+            pamrs.simulate(
+                rig, length=wave, sample_time=0.01, initial={"muscle_pressure": 3e5}, **own
+            )
+            for own in ({"step": 0.01}, {"step": 1e-4})
+        )
+        span = np.ptp(finer["muscle_force"])
+        np.testing.assert_allclose(
+            usual["muscle_force"], finer["muscle_force"], rtol=0.0, atol=0.01 * span
+        )
 
 
 def test_what_is_cut_says_what_was_simulated() -> None:

@@ -162,6 +162,7 @@ impl Block {
             Self::Chamber(k) | Self::Temperature(k) => {
                 places.push(layout.mass(k));
                 places.extend(effect_states(rig, Place::Gas(k)));
+                places.extend(giving_states(rig));
             }
             Self::Supply(k) => places.extend(effect_states(rig, Place::Supply(k))),
             Self::Flow(_) => {}
@@ -173,15 +174,13 @@ impl Block {
         for (gas, _) in behind_gauges(rig, measured) {
             places.extend([layout.pressure(gas), layout.mass(gas)]);
             places.extend(effect_states(rig, Place::Gas(gas)));
+            places.extend(giving_states(rig));
         }
         for supply in unread(rig, self, measured) {
             places.push(layout.supply(supply));
             places.extend(effect_states(rig, Place::Supply(supply)));
         }
         if !self.mechanical() {
-            let muscles = rig.wiring.ports.muscles.iter();
-            let gives = muscles.filter_map(|muscle| muscle.give.as_ref());
-            places.extend(gives.flat_map(|acting| own_states(layout, acting)));
             places.extend(inlets(layout, measured));
             places.extend(layout.flow(0)..layout.angle(0));
         }
@@ -198,6 +197,14 @@ impl Block {
 fn effect_states(rig: &Rig, place: Place) -> impl Iterator<Item = usize> + '_ {
     let here = rig.wiring.ports.integrated().filter(move |(at, _)| *at == place);
     here.flat_map(|(_, acting)| own_states(&rig.layout, &acting))
+}
+
+/// Integrated states of the effects on muscles with something that gives, by which a gas has the
+/// volume that it has.
+fn giving_states(rig: &Rig) -> impl Iterator<Item = usize> + '_ {
+    let muscles = rig.wiring.ports.muscles.iter().enumerate();
+    let giving = muscles.filter(|(_, muscle)| muscle.give.is_some());
+    giving.flat_map(|(k, _)| effect_states(rig, Place::Group(k)))
 }
 
 /// Places of the states of what acts.

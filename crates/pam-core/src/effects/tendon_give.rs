@@ -3,9 +3,9 @@
 //! A spring with a damper beside it stands in series with each muscle of a group: it is longer by
 //! `s` under the pull `F`, `s' = (s_F - s)/tau` with `s_F` the stretch that holds `F` at rest, and
 //! the muscle is as much shorter at the same angle: `e = (x(q) + s)/L`. The gas has the volume of
-//! the shorter muscle. Damping and creep beside the muscle follow the motion of its load. One state
-//! for each group, the stretch [m]; at the start it is at rest under the pull. G. A. Pratt &
-//! M. M. Williamson, "Series elastic actuators", IROS 1995.
+//! the shorter muscle. Damping of the muscle follows the motion of its load; what remembers a way,
+//! or creeps, follows its own. One state for each group, the stretch [m]; at the start it is at rest
+//! under the pull. G. A. Pratt & M. M. Williamson, "Series elastic actuators", IROS 1995.
 //!
 //! `linear`: `s_F = c F`.
 //!
@@ -23,7 +23,7 @@ const TIME: EffectParameter =
     EffectParameter::new("time_constant", "s", 0.001, 1.0, 0.01).starts(&[0.01]).role(Use::Held);
 
 const COMPLIANCE: EffectParameter =
-    EffectParameter::new("compliance", "m/N", 0.0, 1e-2, 2e-6).starts(&[2e-6, 2e-5]).off(0.0);
+    EffectParameter::new("compliance", "m/N", 0.0, 1e-3, 2e-6).starts(&[2e-6, 2e-5]).off(0.0);
 
 const LINEAR: Form = Form {
     name: "linear",
@@ -58,10 +58,6 @@ pub const INFO: EffectInfo = EffectInfo {
     ],
     ..EffectInfo::USUAL
 };
-
-/// How far a start goes at once to where the pull holds it: all the way oscillates where the muscle
-/// is the stiffer one.
-const APPROACH: f64 = 0.5;
 
 /// Stretch [m] at rest under a pull [N].
 #[derive(Debug, Clone, Copy)]
@@ -108,7 +104,7 @@ fn toe<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
 impl<S: Scalar> Effect<S> for Give<S> {
     fn start(&self, _gas: &Gas, at: &At<S>, own: &mut [S]) {
         if let At::Muscle(muscle) = at {
-            own[0] += (self.law.at(muscle.force) - own[0]) * APPROACH;
+            own[0] = self.law.at(muscle.force);
         }
     }
 
@@ -148,9 +144,7 @@ mod tests {
             let (mut own, mut rates) = ([0.0], [0.0]);
             effect.rates(&pulled(500.0), &own, &mut rates);
             assert!((rates[0] - rest / 0.01).abs() < 1e-12);
-            for _ in 0..60 {
-                effect.start(&gas, &pulled(500.0), &mut own);
-            }
+            effect.start(&gas, &pulled(500.0), &mut own);
             assert!((own[0] - rest).abs() < 1e-15);
             effect.rates(&pulled(500.0), &own, &mut rates);
             assert!(rates[0].abs() < 1e-12);

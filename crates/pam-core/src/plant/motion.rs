@@ -235,30 +235,44 @@ impl Plant<'_, f64> {
             .max(self.fastest_give())
     }
 
-    /// Fastest rate of what gives between a muscle and its load [1/s].
+    /// Fastest rate of what gives between a muscle and its load, and of what else remembers there
+    /// [1/s].
     pub(crate) fn fastest_give(&self) -> f64 {
         let muscles = self.wiring.ports.muscles.iter().enumerate();
         let rate = |k: usize, give: &Acting| {
             let effect = self.effect(give);
-            effect.fastest() * (1.0 + self.muscle_stiffness(k) * effect.mobility())
+            let own = effect.fastest() * (1.0 + self.muscle_stiffness(k) * effect.mobility());
+            own.max(self.fastest_effect(|place| place == Place::Group(k)))
         };
         let rates = muscles.filter_map(|(k, m)| m.give.as_ref().map(|give| rate(k, give)));
         rates.fold(0.0, f64::max)
     }
 
-    /// Largest stiffness of one muscle of a group [N/m] at the highest pressure.
+    /// Largest stiffness of one muscle of a group [N/m] at the highest pressure, with what its
+    /// friction, its contacts and the air in it add.
     fn muscle_stiffness(&self, k: usize) -> f64 {
         let group = &self.wiring.groups[k];
-        let gauge = Slope::from(self.rig.highest_pressure() - self.rig.gas.ambient_pressure);
+        let pressure = self.rig.highest_pressure();
+        let gauge = pressure - self.rig.gas.ambient_pressure;
         let (low, high) = self.rig.range(group);
-        let slope = |i: u32| {
+        let high = group.muscle.table.e_max.min(high + 0.5 * (high - low)); // it is shorter
+        let at = |i: u32| {
             let share = f64::from(i) / f64::from(ARM_POINTS);
             let contraction = Slope::new(low + (high - low) * share, 1.0);
             let table = group.muscle.table.eval(contraction);
-            let scale = Slope::from(self.scales[k]);
-            group.muscle.pull(&table, gauge, contraction, scale).slope().abs()
+            let pull = |scale: f64| {
+                group.muscle.pull(&table, Slope::from(gauge), contraction, Slope::from(scale))
+            };
+            let friction = self.presliding_stiffness(k, group, pull(1.0).re.abs(), gauge);
+            let swept = table.volume_slope.re / group.rest_length;
+            let volume = self.fixed_volume[group.chamber] + table.volume.re.max(0.0) * group.count;
+            let air = self.alphas[group.chamber].volume * pressure * swept * swept * group.count
+                / volume.max(f64::MIN_POSITIVE);
+            pull(self.scales[k]).slope().abs() / group.rest_length + friction + air
         };
-        (0..=ARM_POINTS).map(slope).fold(0.0, f64::max) / group.rest_length
+        let most = self.reach((0.0, 0.0), high);
+        let (_, contact) = self.summed(&self.wiring.ports.muscles[k].force, &most);
+        (0..=ARM_POINTS).map(at).fold(0.0, f64::max) + contact / group.rest_length
     }
 
     /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest

@@ -495,6 +495,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
                     let rate = self.give_rate(k, group, state, force, &mut here.felt);
                     here.volume_rate[group.chamber] +=
                         muscle.table.volume_slope * rate * (group.count / group.rest_length);
+                    here.muscle_work += force * rate;
                 }
                 let torque = force * muscle.point.torque_arm;
                 here.torque[group.coordinate] += torque;

@@ -6,8 +6,12 @@ use super::units::Node;
 use crate::effects::{At, AtMuscle, Port, BAR};
 use crate::scalar::{constant, Scalar};
 
-/// How often a start that approaches rest is asked for.
+/// Steps to where what gives is at rest with its muscle: a secant needs a dozen, halves 50.
 const APPROACHES: usize = 60;
+/// Least difference of two stretches that tells how the pull falls with it [m].
+const TELLING: f64 = 1e-9;
+/// Times that effects start, where what they remember and what gives depend on each other.
+const ROUNDS: usize = 4;
 
 impl<S: Scalar> Plant<'_, S> {
     /// A supply or a gas.
@@ -124,7 +128,8 @@ impl<S: Scalar> Plant<'_, S> {
     /// moved for long, valves are shut.
     pub fn start(&self, state: &mut [S]) {
         if self.altered.gives {
-            self.start_effects(state); // the gases have the volumes of muscles that gave
+            // the gases have the volumes of muscles that gave
+            (1..ROUNDS).for_each(|_| self.start_effects(state));
         }
         for gas in 0..self.layout.gases {
             state[self.layout.mass(gas)] = self.initial_mass(gas, state);
@@ -137,16 +142,15 @@ impl<S: Scalar> Plant<'_, S> {
         let shut = vec![constant(0.0); wiring.valves.len()];
         let mut here = self.scratch();
         for (place, acting) in wiring.ports.all.iter().filter(|(_, acting)| acting.count > 0) {
-            let form = wiring.ports.effects[acting.effect].form;
-            // what gives changes the force that it is at rest with
-            let times = if form.ports.contains(&Port::Give) { APPROACHES } else { 1 };
-            for _ in 0..times {
-                if matches!(place, Place::Group(_)) {
-                    self.mechanics_at_rest(state, &mut here); // with what acts before it
-                }
-                let at = self.at(*place, acting, state, &shut, &here);
-                self.effect(acting).start(&self.rig.gas, &at, self.own_mut(acting, state));
+            if wiring.ports.effects[acting.effect].form.ports.contains(&Port::Give) {
+                self.settle(*place, acting, state, &shut, &mut here);
+                continue;
             }
+            if matches!(place, Place::Group(_)) {
+                self.mechanics_at_rest(state, &mut here); // with what acts before it
+            }
+            let at = self.at(*place, acting, state, &shut, &here);
+            self.effect(acting).start(&self.rig.gas, &at, self.own_mut(acting, state));
         }
         for gas in 0..self.layout.gases {
             if let Some((reading, _)) = self.lagging(gas) {
@@ -155,6 +159,39 @@ impl<S: Scalar> Plant<'_, S> {
             if let Some((reading, _)) = self.thermometer(gas) {
                 state[reading] = self.temperature(gas, state);
             }
+        }
+    }
+
+    /// Let what gives come to rest under a pull that falls with its stretch: a secant between
+    /// bounds, its slope a plain number, which brings the derivatives to rest as well.
+    fn settle(
+        &self,
+        place: Place,
+        acting: &Acting,
+        state: &mut [S],
+        shut: &[S],
+        here: &mut Scratch<S>,
+    ) {
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let (mut steepness, mut last) = (1.0, None);
+        for _ in 0..APPROACHES {
+            self.mechanics_at_rest(state, here);
+            let at = self.at(place, acting, state, shut, here);
+            let now = self.own(acting, state)[0];
+            let mut rest = [now];
+            self.effect(acting).start(&self.rig.gas, &at, &mut rest);
+            let gap = rest[0] - now;
+            let (s, g) = (now.re(), gap.re());
+            (low, high) = if g < 0.0 { (low, s) } else { (s, high) };
+            if let Some((s_last, g_last)) = last.replace((s, g)) {
+                if f64::abs(s - s_last) > TELLING {
+                    steepness = f64::max(1.0, (g_last - g) / (s - s_last));
+                }
+            }
+            let next = now + gap / steepness;
+            let inside = low <= next.re() && next.re() <= high;
+            let middle = 0.5 * (low + high);
+            self.own_mut(acting, state)[0] = if inside { next } else { now + (middle - s) };
         }
     }
 

@@ -447,8 +447,10 @@ def _models_of(
         if any(c.fit.events is not None for c in chosen):
             continue
         if {term for c in chosen for term in c.terms} == wanted:
-            pairs = zip(judged, chosen, strict=True)
-            corrected = [j.form or c if c is j.named_alone else c for j, c in pairs]
+            corrected = [
+                j.form or c if j.named and c is j.named_alone else c
+                for j, c in zip(judged, chosen, strict=True)
+            ]
             likely.append((str(hypothesis), model(corrected), p))
     return likely
 

@@ -53,7 +53,7 @@ from pamrs.simulation import Simulation, core_rig, reading
 _LEAST_PROBABILITY = 0.01  # probability below which a given hypothesis is not simulated
 # hypotheses that are simulated, the most probable ones (every pair is compared)
 _MOST_HYPOTHESES = 6
-# [bit] difference of information that counts; below it the shorter experiment is better
+# [bit] difference of information that counts; below it the cheaper experiment is better
 _RESOLUTION = 0.02
 _LEAST_BITS = 0.05  # [bit] expected information below which an experiment parts nothing
 _MOST_SHOWN = 5  # experiments in the ranking
@@ -305,17 +305,12 @@ def shown_by(
 
 
 def ranked(outcomes: Sequence[Outcome]) -> list[Outcome]:
-    """Outcomes of the same hypotheses by their information for each minute that they take, the
-    largest first; of those with the same, the cheapest. An experiment that needs what the rig file
-    does not list comes last.
+    """Outcomes of the same hypotheses by their information, the largest first; of those with the
+    same, the cheapest. An experiment that needs what the rig file does not list comes last.
     """
-
-    def place(outcome: Outcome) -> tuple[bool, float, float]:
-        effort = max(outcome.effort, outcome.experiment.duration)
-        told = round(outcome.bits / _RESOLUTION)
-        return bool(outcome.experiment.needs), -told / effort, effort
-
-    return sorted(outcomes, key=place)
+    return sorted(
+        outcomes, key=lambda o: (bool(o.experiment.needs), -round(o.bits / _RESOLUTION), o.effort)
+    )
 
 
 def propose(
