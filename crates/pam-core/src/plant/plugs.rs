@@ -230,6 +230,15 @@ fn fits_supply(supply: &SupplyUnit, kinds: &[&str]) -> bool {
     kinds.contains(&supply_kind(supply))
 }
 
+/// The supply or gas at a place.
+fn node(place: Place) -> Node {
+    match place {
+        Place::Supply(k) => Node::Supply(k),
+        Place::Gas(k) => Node::Gas(k),
+        _ => Node::Ambient,
+    }
+}
+
 fn place(kind: &str, k: usize) -> Place {
     match kind {
         "supply" => Place::Supply(k),
@@ -327,17 +336,11 @@ impl Ports {
             (Port::Clearance, Place::Valve(k)) => {
                 push(&mut self.flows, (Flow::Clearance(k), acting))
             }
-            (Port::Leak, Place::Supply(k)) => {
-                push(&mut self.flows, (Flow::Leak(Node::Supply(k)), acting))
+            (Port::Leak, Place::Supply(_) | Place::Gas(_)) => {
+                push(&mut self.flows, (Flow::Leak(node(place)), acting))
             }
-            (Port::Leak, Place::Gas(k)) => {
-                push(&mut self.flows, (Flow::Leak(Node::Gas(k)), acting))
-            }
-            (Port::Inflow, Place::Supply(k)) => {
-                push(&mut self.flows, (Flow::Inflow(Node::Supply(k)), acting))
-            }
-            (Port::Inflow, Place::Gas(k)) => {
-                push(&mut self.flows, (Flow::Inflow(Node::Gas(k)), acting))
+            (Port::Inflow, Place::Supply(_) | Place::Gas(_)) => {
+                push(&mut self.flows, (Flow::Inflow(node(place)), acting))
             }
             (Port::Feed, Place::Supply(k)) => push(&mut self.feed[k], acting),
             (Port::Balance, Place::Gas(k)) => self.balance[k].replace(acting),
