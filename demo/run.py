@@ -48,14 +48,14 @@ def judgement(key: dict[str, Any], result: dict[str, Any]) -> str:
     if not right:
         held = truth in sets
         return "The first answer is NOT the truth this time" + (
-            ", but the diagnosis leaves it open, and the truth is among what stands."
+            ", but the diagnosis leaves it open, and the truth is among what is open."
             if held
             else "."
         )
     if rivals:
         others = " and ".join(" + ".join(WORDS.get(name, name) for name in s) for s in rivals)
-        stand = "stands" if len(rivals) == 1 else "stand"
-        return f"The verdict is right, but not settled: {others} also {stand}."
+        still = "is" if len(rivals) == 1 else "are"
+        return f"The verdict is right, but not settled: {others} {still} open as well."
     answer = result["answer"]
     if not answer["settled"]:
         why = f"its probability is {answer['probability']:.2f}"
