@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from fingerprints.sheet import (
     BAR,
@@ -56,6 +57,13 @@ def bench(
     }
     without, with_ = (simulate(rig, **drive) for rig in pair)
     return without, with_
+
+
+def triangle(sheet: Sheet, axis: Axes) -> None:
+    """Angle of the joint by the pressure of a slow triangle, without the effect and with it."""
+    time = clock(80.0, 0.05)
+    runs = sheet.run(supply_command=BAR * zigzag(time, 0.0, 4.5, 0.0, over=40.0), sample_time=0.05)
+    sheet.both(axis, runs, angle, pressure)
 
 
 def pull(run: Simulation) -> Array:
@@ -314,9 +322,7 @@ def crowding(sheet: Sheet) -> None:
         "with less without [N]",
         "lower left",
     )
-    time = clock(80.0, 0.05)
-    runs = sheet.run(supply_command=BAR * zigzag(time, 0.0, 4.5, 0.0, over=40.0), sample_time=0.05)
-    sheet.both(axes["x"], runs, angle, pressure)
+    triangle(sheet, axes["x"])
     axes["x"].set(xlim=(2.0, 4.6), ylim=(50.0, 122.0))
     label(
         axes["x"],
@@ -349,9 +355,7 @@ def give(sheet: Sheet) -> None:
         "pull [N]",
         "upper right",
     )
-    time = clock(80.0, 0.05)
-    runs = sheet.run(supply_command=BAR * zigzag(time, 0.0, 4.5, 0.0, over=40.0), sample_time=0.05)
-    sheet.both(axes["x"], runs, angle, pressure)
+    triangle(sheet, axes["x"])
     label(
         axes["x"],
         "joint: falls short, more with more pull",

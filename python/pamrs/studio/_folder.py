@@ -508,8 +508,8 @@ def checked(case: Case) -> CheckedCase:
     DiagnosisError
         If units or columns cannot be right, or no block of the rig can be judged.
     """
-    checked = check_case(case, DiagnosisSettings())
-    cautions = [*case.rig.cautions, *checked.suspected, *checked.doubts, *_issues(case)]
+    sound = check_case(case, DiagnosisSettings())
+    cautions = [*case.rig.cautions, *sound.suspected, *sound.doubts, *_issues(case)]
     return CheckedCase("", list(dict.fromkeys(cautions)), dict(case.inputs))
 
 

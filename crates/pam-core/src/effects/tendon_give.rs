@@ -59,58 +59,44 @@ pub const INFO: EffectInfo = EffectInfo {
     ..EffectInfo::USUAL
 };
 
-/// Stretch [m] at rest under a pull [N].
-#[derive(Debug, Clone, Copy)]
-enum Law<S> {
-    Linear(S),
-    Toe(S, S),
-}
-
-impl<S: Scalar> Law<S> {
-    #[inline]
-    fn at(self, pull: S) -> S {
-        match self {
-            Self::Linear(compliance) => compliance * pull,
-            // a push is no cord's: as soft as at no pull
-            Self::Toe(compliance, half) if pull.re() > 0.0 => {
-                compliance * pull / (pull / half + 1.0)
-            }
-            Self::Toe(compliance, _) => compliance * pull,
-        }
-    }
-
-    fn softest(self) -> f64 {
-        match self {
-            Self::Linear(compliance) | Self::Toe(compliance, _) => compliance.re(),
-        }
-    }
-}
-
 /// What gives between a muscle and its load; its state is by how much [m].
 #[derive(Debug, Clone, Copy)]
 struct Give<S> {
-    law: Law<S>,
+    compliance: S,
+    /// Pull at which a toe has half of its compliance; none of what has no toe.
+    half_force: Option<S>,
     time_constant: S,
 }
 
 fn linear<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
-    Box::new(Give { law: Law::Linear(values[0]), time_constant: values[1] })
+    Box::new(Give { compliance: values[0], half_force: None, time_constant: values[1] })
 }
 
 fn toe<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
-    Box::new(Give { law: Law::Toe(values[0], values[1]), time_constant: values[2] })
+    Box::new(Give { compliance: values[0], half_force: Some(values[1]), time_constant: values[2] })
+}
+
+impl<S: Scalar> Give<S> {
+    /// Stretch [m] at rest under a pull [N]; a push is no cord's: as soft as at no pull.
+    #[inline]
+    fn rest(&self, pull: S) -> S {
+        match self.half_force {
+            Some(half) if pull.re() > 0.0 => self.compliance * pull / (pull / half + 1.0),
+            _ => self.compliance * pull,
+        }
+    }
 }
 
 impl<S: Scalar> Effect<S> for Give<S> {
     fn start(&self, _gas: &Gas, at: &At<S>, own: &mut [S]) {
         if let At::Muscle(muscle) = at {
-            own[0] = self.law.at(muscle.force);
+            own[0] = self.rest(muscle.force);
         }
     }
 
     fn rates(&self, at: &At<S>, own: &[S], rates: &mut [S]) {
         if let At::Muscle(muscle) = at {
-            rates[0] = (self.law.at(muscle.force) - own[0]) / self.time_constant;
+            rates[0] = (self.rest(muscle.force) - own[0]) / self.time_constant;
         }
     }
 
@@ -119,7 +105,7 @@ impl<S: Scalar> Effect<S> for Give<S> {
     }
 
     fn mobility(&self) -> f64 {
-        self.law.softest()
+        self.compliance.re()
     }
 }
 
@@ -153,10 +139,10 @@ mod tests {
 
     #[test]
     fn a_toe_is_as_soft_as_at_no_pull_where_it_is_pushed() {
-        let law = Law::Toe(4e-6, 500.0);
-        let slope = |from: f64| (law.at(from + 1e-3) - law.at(from)) / 1e-3;
-        assert!((slope(-100.0) / law.softest() - 1.0).abs() < 1e-9);
-        assert!((slope(0.0) / law.softest() - 1.0).abs() < 1e-5);
-        assert!(slope(500.0) < 0.3 * law.softest());
+        let give = Give { compliance: 4e-6, half_force: Some(500.0), time_constant: 0.01 };
+        let slope = |from: f64| (give.rest(from + 1e-3) - give.rest(from)) / 1e-3;
+        assert!((slope(-100.0) / give.mobility() - 1.0).abs() < 1e-9);
+        assert!((slope(0.0) / give.mobility() - 1.0).abs() < 1e-5);
+        assert!(slope(500.0) < 0.3 * give.mobility());
     }
 }

@@ -27,7 +27,7 @@ impl<S: Scalar> Plant<'_, S> {
     /// Contraction ratios of the muscles, without their derivatives.
     pub fn where_muscles_are(&self, state: &[S], out: &mut Vec<f64>) {
         out.clear();
-        out.extend((0..self.wiring.groups.len()).map(|k| self.contraction(k, state).re()));
+        out.extend((0..self.wiring.groups.len()).map(|k| self.contraction_now(k, state)));
     }
 
     /// What the sensitivities of the gases gain by the kinks between the contraction ratios at which
@@ -41,8 +41,7 @@ impl<S: Scalar> Plant<'_, S> {
         state: &mut [S],
     ) {
         for (k, (was, group)) in from.iter().zip(&self.wiring.groups).enumerate() {
-            let contraction = self.contraction(k, state);
-            let now = contraction.re();
+            let now = self.contraction_now(k, state);
             let jump: f64 = (group.muscle.table.volume_kinks().iter())
                 .filter(|kink| (*was < kink.at) != (now < kink.at))
                 .map(|kink| if *was < now { kink.jump } else { -kink.jump })
@@ -51,7 +50,7 @@ impl<S: Scalar> Plant<'_, S> {
             if jump == 0.0 || !simulated.moves(place) {
                 continue;
             }
-            let change = (contraction - now) * (jump * group.count);
+            let change = (self.contraction(k, state) - now) * (jump * group.count);
             let (pressure, mass) = self.swollen(gas, change, state, controls, here);
             state[place] += pressure;
             if simulated.moves(self.layout.mass(gas)) {

@@ -2,6 +2,7 @@
 //! that gives way.
 
 use crate::dual::Slope;
+use crate::muscle::TablePoint;
 
 use super::body::Body;
 use super::ports::{Acting, Place};
@@ -248,6 +249,21 @@ impl Plant<'_, f64> {
         rates.fold(0.0, f64::max)
     }
 
+    /// Stiffness of the air in the muscles of a group where their shortening is `arm` times a
+    /// motion: [N/m] for a motion of the muscles themselves, [N m/rad] for one of a joint.
+    fn air_stiffness(
+        &self,
+        group: &Group,
+        table: &TablePoint<Slope>,
+        arm: f64,
+        pressure: f64,
+    ) -> f64 {
+        let volume = (self.fixed_volume[group.chamber] + table.volume.re.max(0.0) * group.count)
+            .max(f64::MIN_POSITIVE);
+        let swept = table.volume_slope.re * arm * group.count / group.rest_length;
+        self.alphas[group.chamber].volume * pressure * swept * swept / volume
+    }
+
     /// Largest stiffness of one muscle of a group [N/m] at the highest pressure, with what its
     /// friction, its contacts and the air in it add.
     fn muscle_stiffness(&self, k: usize) -> f64 {
@@ -264,10 +280,7 @@ impl Plant<'_, f64> {
                 group.muscle.pull(&table, Slope::from(gauge), contraction, Slope::from(scale))
             };
             let friction = self.presliding_stiffness(k, group, pull(1.0).re.abs(), gauge);
-            let swept = table.volume_slope.re / group.rest_length;
-            let volume = self.fixed_volume[group.chamber] + table.volume.re.max(0.0) * group.count;
-            let air = self.alphas[group.chamber].volume * pressure * swept * swept * group.count
-                / volume.max(f64::MIN_POSITIVE);
+            let air = self.air_stiffness(group, &table, 1.0, pressure) / group.count;
             pull(self.scales[k]).slope().abs() / group.rest_length + friction + air
         };
         let most = self.reach((0.0, 0.0), high);
@@ -298,11 +311,7 @@ impl Plant<'_, f64> {
                 };
                 let torque = pull(self.scales[k]) * point.torque_arm;
                 let arm = point.moment_arm.re.abs();
-                let volume = (self.fixed_volume[group.chamber]
-                    + table.volume.re.max(0.0) * group.count)
-                    .max(f64::MIN_POSITIVE);
-                let swept = table.volume_slope.re * arm * group.count / group.rest_length;
-                let air = self.alphas[group.chamber].volume * pressure * swept * swept / volume;
+                let air = self.air_stiffness(group, &table, arm, pressure);
                 let friction = self.presliding_stiffness(k, group, pull(1.0).re.abs(), gauge);
                 most = most.max(group.count * (torque.slope().abs() + friction * arm * arm) + air);
             }

@@ -48,13 +48,23 @@ impl<S: Scalar> Plant<'_, S> {
         self.shortening(k, &point, state) / group.rest_length
     }
 
-    /// Rate [m/s] at which gives what is between the muscles of a group and their load, under the
-    /// force of all of them [N], which is written to `felt`.
+    /// The same without its derivatives, which nothing works out.
+    pub(crate) fn contraction_now(&self, k: usize, state: &[S]) -> f64 {
+        let group = &self.wiring.groups[k];
+        let angle = state[self.layout.angle(group.coordinate)].re();
+        let give = self.wiring.ports.muscles[k].give.as_ref();
+        let given = give.map_or(0.0, |acting| self.own(acting, state)[0].re());
+        (group.joint.eval(angle).shortening + given) / group.rest_length
+    }
+
+    /// Rate [m/s] at which gives what is between the muscles of a group and their load, at a point
+    /// of their joint under the force of all of them [N], which is written to `felt`.
     pub(super) fn give_rate(
         &self,
         k: usize,
         group: &Group,
         state: &[S],
+        point: &JointPoint<S>,
         force: S,
         felt: &mut [S],
     ) -> S {
@@ -62,7 +72,7 @@ impl<S: Scalar> Plant<'_, S> {
         if let Some(acting) = &self.wiring.ports.muscles[k].give {
             let force = force / group.count;
             feel(acting, force, felt);
-            let at = At::Muscle(AtMuscle { force, ..self.at_group(k, state) });
+            let at = At::Muscle(AtMuscle { force, ..self.at_muscle(k, group, state, point) });
             self.effect(acting).rates(&at, self.own(acting, state), &mut rate);
         }
         rate[0]
@@ -178,7 +188,7 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Contraction ratio of each group at a state.
     pub fn contractions(&self, state: &[S], out: &mut [S]) {
-        for (k, out) in out.iter_mut().enumerate().take(self.wiring.groups.len()) {
+        for (k, out) in (0..self.wiring.groups.len()).zip(out) {
             *out = self.contraction(k, state);
         }
     }

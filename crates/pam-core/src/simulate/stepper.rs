@@ -369,7 +369,7 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &[S], time: f6
         if !group.joint.reaches(angle) {
             return failure("joint_angle", angle, "an angle that the tendon reaches");
         }
-        let contraction = plant.contraction(k, state).re();
+        let contraction = plant.contraction_now(k, state);
         let table = &group.muscle.table;
         if !table.contains(contraction) {
             let allowed =
