@@ -21,7 +21,7 @@ _EVIDENCE = "pamrs.diagnosis.evidence"
 #: what is left out of prior and posterior: names of their modules, and what stands in their place
 WEIGHTS: dict[str, dict[str, Any]] = {
     "more of the evidence counts near the noise": {"_posterior._tempering": lambda *_: 0.02},
-    "forms of equations err": {"_posterior._FORM_ERROR": 1e-6},
+    "forms of equations err": {"_posterior.FORM_ERROR": 1e-6},
     "a missed name leaves little": {"_posterior._odds_of_form": lambda taken, _: taken},
     "noise levels err": {"_posterior._LEAST_ERROR": 1e-6},
     "a right name may be missed": {"_posterior.MISSED_ODDS": 0.0},

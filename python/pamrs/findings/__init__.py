@@ -13,6 +13,7 @@ become JSON, and `fields_from`, which reads it.
 """
 
 from pamrs.findings._answer import (
+    FORM_ERROR,
     MENDED,
     MOST_MISSED,
     NOISE_LEVELS,
@@ -77,6 +78,7 @@ __all__ = [
     "DETECTED",
     "HEALTHY",
     "MENDED",
+    "FORM_ERROR",
     "MOST_MISSED",
     "NOISE_LEVELS",
     "NOT_JUDGED",

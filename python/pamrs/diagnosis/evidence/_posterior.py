@@ -35,13 +35,12 @@ from pamrs.diagnosis.noise import SIZE_SPREAD
 from pamrs.diagnosis.prepare import NOISE_STDS, Block
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import UNDECIDED, UNLISTED, WITHOUT_NAME, Hypothesis, Term, effect_of
+from pamrs.findings import FORM_ERROR
 
 # tempering, the share of the logarithm of evidence that counts: at least, at most, and as a
 # numerator over the variance that is left, since what no model explains depends on itself
 # (decision 14)
 LEAST_TEMPERING, _MOST_TEMPERING, _NOISE_TEMPERING = 0.01, 0.1, 0.3
-# share of what it explains that a right name leaves, as forms of equations err (decision 14)
-_FORM_ERROR = 0.1
 # [noise levels of bin means] error whatever is explained: these levels err (decision 14)
 _LEAST_ERROR = 0.1
 _STRAIN_SHARE = 0.5  # share of the priors' sum of squares that counts (decision 14)
@@ -121,8 +120,8 @@ def _odds_of_form(taken: float, least: float) -> float:
     leaves an amplitude as forms of right names that err do (log-normal), of which the best name for
     other physics leaves any share, each as probable. No smaller one than `least` is known.
     """
-    left = max(math.sqrt(1.0 - taken), least, _FORM_ERROR * math.exp(-(SIZE_SPREAD**2)))
-    far = math.log(left / _FORM_ERROR) / SIZE_SPREAD
+    left = max(math.sqrt(1.0 - taken), least, FORM_ERROR * math.exp(-(SIZE_SPREAD**2)))
+    far = math.log(left / FORM_ERROR) / SIZE_SPREAD
     density = math.exp(-0.5 * far**2) / (math.sqrt(2.0 * math.pi) * SIZE_SPREAD * left)
     return taken * max(1.0, density)
 
@@ -166,7 +165,7 @@ def _evidence(
     for name in (block.name for block in compared):
         now, before = candidate.likelihood()[name], baseline.likelihood()[name]
         taken = max(0.0, before.size**2 - now.size**2)
-        expected = _LEAST_ERROR + _FORM_ERROR * math.sqrt(taken)
+        expected = _LEAST_ERROR + FORM_ERROR * math.sqrt(taken)
         beyond = np.log(np.maximum(now.sizes, expected) / expected) / SIZE_SPREAD
         # windows that are too short for a hypothesis leave it fewer bins
         tempered = tempering * before.count / max(1, now.count) * now.by_size
@@ -180,7 +179,7 @@ def _log_weight_unlisted(
     """Log weight of physics without a name, as if a right name explained all."""
     total = 0.0
     for likelihood in (baseline.likelihood()[block.name] for block in compared):
-        error = _LEAST_ERROR + _FORM_ERROR * likelihood.size
+        error = _LEAST_ERROR + FORM_ERROR * likelihood.size
         total += max(likelihood.log_density, likelihood.expected(error))
     return tempering * total - UNLISTED_PRICE - _strain(baseline)
 
