@@ -14,11 +14,14 @@
 //! length: `F - s y`, `y' = (F - y)/tau`, `F` the force before this effect; after long rest `(1 -
 //! s) F` is left. The quasi-linear viscoelasticity of Y. C. Fung, *Biomechanics: Mechanical
 //! Properties of Living Tissues* (1981), ch. 7, with one exponential in the place of his spectrum.
-//! One state, the force `y` [N] that has relaxed; at the start it is that of the muscle, at rest.
+//! One state, the force `y` [N] that has relaxed; at the start it is `relaxed` of that of the
+//! muscle: 1 at rest, 0 where the load came on just then.
 //!
 //! `bladder_relaxation`: the same of the bladder's part of the force, which is what is rubber.
 
-use super::{At, AtMuscle, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
+use super::{
+    At, AtMuscle, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role,
+};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
@@ -44,6 +47,7 @@ const RELAXATION: Form = Form {
     parameters: &[
         EffectParameter::new("share", "1", 0.0, 0.9, 0.05).starts(&[0.03, 0.1]).off(0.0),
         TIME_CONSTANT,
+        EffectParameter::new("relaxed", "1", 0.0, 1.0, 1.0).starts(&[0.0, 1.0]),
     ],
     make: made_by!(of_force),
     ..SOLID
@@ -55,6 +59,7 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "muscle",
     at: "muscle",
     order: 2,
+    at_rest: &[AtRest::Set("relaxed", 1.0)],
     source:
         "Findley, Lai & Onaran (1976); Schulte (1961); Fung, Biomechanics (1981), quasi-linear \
         viscoelasticity for the relaxation of force",
@@ -142,10 +147,12 @@ struct Relaxation<S> {
     bladder: bool,
     share: S,
     time_constant: S,
+    relaxed: S,
 }
 
 fn relaxation<S: Scalar>(bladder: bool, values: &[S]) -> Box<dyn Effect<S>> {
-    Box::new(Relaxation { bladder, share: values[0], time_constant: values[1] })
+    let [share, time_constant, relaxed] = [values[0], values[1], values[2]];
+    Box::new(Relaxation { bladder, share, time_constant, relaxed })
 }
 
 fn of_force<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
@@ -166,7 +173,7 @@ impl<S: Scalar> Relaxation<S> {
 impl<S: Scalar> Effect<S> for Relaxation<S> {
     fn start(&self, _gas: &Gas, at: &At<S>, own: &mut [S]) {
         if let At::Muscle(muscle) = at {
-            own[0] = muscle.force;
+            own[0] = self.relaxed * muscle.force;
         }
     }
 
@@ -205,12 +212,12 @@ mod tests {
         AtMuscle { gauge, contraction, length, rate, stretched, force }
     }
 
-    /// What a form adds to the force after a step of length and force from rest, now and a time [s]
-    /// later, with a strength of 2 kN/m or of a tenth.
-    fn step(form: &Form, time: f64) -> (f64, f64) {
+    /// What a form adds to the force after a step of length and force, now and a time [s] later,
+    /// with a strength of 2 kN/m or of a tenth, and so much of the first force relaxed before.
+    fn step(form: &Form, time: f64, relaxed: f64) -> (f64, f64) {
         let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
         let strength = if form.parameters[0].name == "share" { 0.1 } else { 2e3 };
-        let effect = (form.make.plain)(&[strength, TAU], &gas);
+        let effect = (form.make.plain)(&[strength, TAU, relaxed], &gas);
         let (n, now) = (form.states.len(), muscle(0.25, 300.0));
         let (mut y, mut method) = (vec![0.0; n], Rk4::new(n));
         effect.start(&gas, &At::Muscle(muscle(0.24, 100.0)), &mut y);
@@ -233,20 +240,22 @@ mod tests {
 
     #[test]
     fn a_step_of_length_relaxes_exponentially() {
-        near(step(&SOLID, TAU), (20.0, 20.0 * (-1.0_f64).exp()));
+        near(step(&SOLID, TAU, 1.0), (20.0, 20.0 * (-1.0_f64).exp()));
     }
 
     #[test]
     fn a_second_branch_takes_ten_times_as_long() {
         let left = 10.0 * ((-1.0_f64).exp() + (-0.1_f64).exp());
-        near(step(INFO.form("two_branches").unwrap(), TAU), (20.0, left));
+        near(step(INFO.form("two_branches").unwrap(), TAU, 1.0), (20.0, left));
     }
 
     #[test]
     fn a_share_of_the_force_relaxes_whatever_moved_it() {
         for name in ["force_relaxation", "bladder_relaxation"] {
-            let later = -0.1 * (300.0 - 200.0 * (-1.0_f64).exp());
-            near(step(INFO.form(name).unwrap(), TAU), (-10.0, later));
+            for (relaxed, before) in [(1.0, 100.0), (0.4, 40.0), (0.0, 0.0)] {
+                let later = -0.1 * (300.0 - (300.0 - before) * (-1.0_f64).exp());
+                near(step(INFO.form(name).unwrap(), TAU, relaxed), (-0.1 * before, later));
+            }
         }
     }
 }
