@@ -158,11 +158,19 @@ def _number(value: Any) -> float | None:
     return float(value) if good else None
 
 
+#: physics of no catalogue in the plans, and the name that the catalogue has had for it since
+NAMED_SINCE = {"tendon_compliance": "tendon_give"}
+
+
 def opened(key: dict[str, Any]) -> Truth:
     """What a key conceals."""
+    effects = [
+        {**e, "id": NAMED_SINCE[e["id"]], "mark": OTHER} if e["id"] in NAMED_SINCE else e
+        for e in key["effects"]
+    ]
     listed = tuple(
         (str(e["id"]), block)
-        for e in key["effects"]
+        for e in effects
         if e["mark"] != UNLISTED
         for block in _where(str(e["block"]), e.get("at", ""))
     )
@@ -175,7 +183,7 @@ def opened(key: dict[str, Any]) -> Truth:
         listed,
         tuple(
             block
-            for e in key["effects"]
+            for e in effects
             if e["mark"] == UNLISTED
             for block in _where(str(e["block"]), e.get("at", ""))
         ),

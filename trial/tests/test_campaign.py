@@ -68,6 +68,8 @@ def result(*effects, verdict="effects", wrong=(), settled=True):
         (key(["leak_muscle"]), result("leak_muscle", wrong=["arm.payload"]), "wrong"),
         (key(["leak_muscle"]), result("leak_muscle", verdict="unlisted"), "wrong"),
         (key(["leak_muscle"]), None, "wrong"),
+        # the catalogue has had a name for it since the plans
+        (key(["tendon_compliance"], mark="unlisted"), result("tendon_give"), "right"),
         (key(wrong=["arm.payload"]), result(verdict="parameters", wrong=["arm.payload"]), "right"),
         (key(verdict="none"), result(verdict="none"), "right"),
         (key(verdict="none"), result("leak_muscle"), "wrong"),

@@ -209,7 +209,7 @@ mod tests {
 
     fn muscle(length: f64, force: f64) -> AtMuscle<f64> {
         let (gauge, contraction, rate, stretched) = (4e5, 0.1, 0.0, 0.0);
-        AtMuscle { gauge, contraction, length, rate, stretched, force }
+        AtMuscle { gauge, contraction, length, rate, stretched, force, stiffness: 0.0 }
     }
 
     /// What a form adds to the force after a step of length and force, now and a time [s] later,

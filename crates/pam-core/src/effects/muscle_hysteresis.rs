@@ -259,7 +259,7 @@ mod tests {
 
     fn muscle(stretched: f64) -> AtMuscle<f64> {
         let (gauge, contraction, length, rate, force) = (3e5, 0.1, 0.25, 0.0, 200.0);
-        AtMuscle { gauge, contraction, length, rate, stretched, force }
+        AtMuscle { gauge, contraction, length, rate, stretched, force, stiffness: 0.0 }
     }
 
     type Made = (&'static Form, Box<dyn Effect<f64>>, Vec<f64>, f64);

@@ -149,6 +149,9 @@ pub struct AtMuscle<S> {
     /// in the order in which they act; at [`Port::Bladder`] the bladder's part of it. Only effects
     /// with states see it in [`Effect::start`] and [`Effect::rates`].
     pub force: S,
+    /// Fall of the force of one muscle without effects with its shortening, and of its air [N/m];
+    /// none where nothing gives between it and its load.
+    pub stiffness: S,
 }
 
 /// A hanging mass at one instant.

@@ -1,11 +1,14 @@
 //! `tendon_give`: cable, strap, fitting or frame between a muscle and its load gives way.
 //!
-//! A spring with a damper beside it stands in series with each muscle of a group: it is longer by
-//! `s` under the pull `F`, `s' = (s_F - s)/tau` with `s_F` the stretch that holds `F` at rest, and
-//! the muscle is as much shorter at the same angle: `e = (x(q) + s)/L`. The gas has the volume of
-//! the shorter muscle. Damping of the muscle follows the motion of its load; what remembers a way,
-//! or creeps, follows its own. One state for each group, the stretch [m]; at the start it is at rest
-//! under the pull. G. A. Pratt & M. M. Williamson, "Series elastic actuators", IROS 1995.
+//! A spring stands in series with each muscle of a group: it is longer by `s` under the pull `F`,
+//! and the muscle is as much shorter at the same angle: `e = (x(q) + s)/L`. It comes to rest with
+//! the muscle within `tau`: `s' = (s_F - s)/(tau (1 + c k))`, with `s_F` the stretch that holds `F`
+//! at rest, `c` its slope over `F` and `k` the stiffness of the muscle with its air, a step of
+//! Newton for each `tau`. That is no damper of any material, and as fast for a soft cable as for a
+//! stiff one. The gas has the volume of the shorter muscle. Damping of the muscle follows the motion
+//! of its load; what remembers a way, or creeps, follows its own. One state for each group, the
+//! stretch [m]; at the start it is at rest under the pull. G. A. Pratt & M. M. Williamson, "Series
+//! elastic actuators", IROS 1995.
 //!
 //! `linear`: `s_F = c F`.
 //!
@@ -20,7 +23,7 @@ use crate::scalar::Scalar;
 
 /// It comes to rest faster than any arm moves.
 const TIME: EffectParameter =
-    EffectParameter::new("time_constant", "s", 0.001, 1.0, 0.01).starts(&[0.01]).role(Use::Held);
+    EffectParameter::new("time_constant", "s", 0.0005, 1.0, 0.001).starts(&[0.001]).role(Use::Held);
 
 const COMPLIANCE: EffectParameter =
     EffectParameter::new("compliance", "m/N", 0.0, 1e-3, 2e-6).starts(&[2e-6, 2e-5]).off(0.0);
@@ -85,6 +88,18 @@ impl<S: Scalar> Give<S> {
             _ => self.compliance * pull,
         }
     }
+
+    /// Slope of that stretch over the pull [m/N].
+    #[inline]
+    fn slope(&self, pull: S) -> S {
+        match self.half_force {
+            Some(half) if pull.re() > 0.0 => {
+                let away = pull / half + 1.0;
+                self.compliance / (away * away)
+            }
+            _ => self.compliance,
+        }
+    }
 }
 
 impl<S: Scalar> Effect<S> for Give<S> {
@@ -96,7 +111,8 @@ impl<S: Scalar> Effect<S> for Give<S> {
 
     fn rates(&self, at: &At<S>, own: &[S], rates: &mut [S]) {
         if let At::Muscle(muscle) = at {
-            rates[0] = (self.rest(muscle.force) - own[0]) / self.time_constant;
+            let softer = self.slope(muscle.force) * muscle.stiffness + 1.0;
+            rates[0] = (self.rest(muscle.force) - own[0]) / (self.time_constant * softer);
         }
     }
 
@@ -116,20 +132,22 @@ mod tests {
 
     fn pulled(force: f64) -> At<f64> {
         let (gauge, contraction, length, rate, stretched) = (4e5, 0.1, 0.2, 0.0, 0.0);
-        At::Muscle(AtMuscle { gauge, contraction, length, rate, stretched, force })
+        let stiffness = 1e5;
+        At::Muscle(AtMuscle { gauge, contraction, length, rate, stretched, force, stiffness })
     }
 
     #[test]
     fn it_comes_to_rest_where_the_pull_holds_it() {
         let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
         let toe = INFO.form("toe").unwrap();
-        for (form, values, rest) in
-            [(&LINEAR, vec![2e-6, 0.01], 1e-3), (toe, vec![4e-6, 500.0, 0.01], 1e-3)]
+        // slower by the 100 N/mm of the muscle; at its half force a toe has a quarter of its slope
+        for (form, values, rest, softer) in
+            [(&LINEAR, vec![2e-6, 0.01], 1e-3, 1.2), (toe, vec![4e-6, 500.0, 0.01], 1e-3, 1.1)]
         {
             let effect = (form.make.plain)(&values, &gas);
             let (mut own, mut rates) = ([0.0], [0.0]);
             effect.rates(&pulled(500.0), &own, &mut rates);
-            assert!((rates[0] - rest / 0.01).abs() < 1e-12);
+            assert!((rates[0] - rest / (0.01 * softer)).abs() < 1e-12);
             effect.start(&gas, &pulled(500.0), &mut own);
             assert!((own[0] - rest).abs() < 1e-15);
             effect.rates(&pulled(500.0), &own, &mut rates);

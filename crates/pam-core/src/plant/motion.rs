@@ -242,7 +242,7 @@ impl Plant<'_, f64> {
         let muscles = self.wiring.ports.muscles.iter().enumerate();
         let rate = |k: usize, give: &Acting| {
             let effect = self.effect(give);
-            let own = effect.fastest() * (1.0 + self.muscle_stiffness(k) * effect.mobility());
+            let own = effect.fastest() * (1.0 + self.further_stiffness(k) * effect.mobility());
             own.max(self.fastest_effect(|place| place == Place::Group(k)))
         };
         let rates = muscles.filter_map(|(k, m)| m.give.as_ref().map(|give| rate(k, give)));
@@ -264,28 +264,21 @@ impl Plant<'_, f64> {
         self.alphas[group.chamber].volume * pressure * swept * swept / volume
     }
 
-    /// Largest stiffness of one muscle of a group [N/m] at the highest pressure, with what its
-    /// friction, its contacts and the air in it add.
-    fn muscle_stiffness(&self, k: usize) -> f64 {
+    /// Largest stiffness that friction and contacts add to one muscle of a group [N/m] at the highest
+    /// pressure.
+    fn further_stiffness(&self, k: usize) -> f64 {
         let group = &self.wiring.groups[k];
-        let pressure = self.rig.highest_pressure();
-        let gauge = pressure - self.rig.gas.ambient_pressure;
+        let gauge = self.rig.highest_pressure() - self.rig.gas.ambient_pressure;
         let (low, high) = self.rig.range(group);
         let high = group.muscle.table.e_max.min(high + 0.5 * (high - low)); // it is shorter
-        let at = |i: u32| {
-            let share = f64::from(i) / f64::from(ARM_POINTS);
-            let contraction = Slope::new(low + (high - low) * share, 1.0);
-            let table = group.muscle.table.eval(contraction);
-            let pull = |scale: f64| {
-                group.muscle.pull(&table, Slope::from(gauge), contraction, Slope::from(scale))
-            };
-            let friction = self.presliding_stiffness(k, group, pull(1.0).re.abs(), gauge);
-            let air = self.air_stiffness(group, &table, 1.0, pressure) / group.count;
-            pull(self.scales[k]).slope().abs() / group.rest_length + friction + air
+        let friction = |i: u32| {
+            let e = low + (high - low) * f64::from(i) / f64::from(ARM_POINTS);
+            let pull = group.muscle.pull(&group.muscle.table.eval(e), gauge, e, 1.0);
+            self.presliding_stiffness(k, group, pull.abs(), gauge)
         };
         let most = self.reach((0.0, 0.0), high);
         let (_, contact) = self.summed(&self.wiring.ports.muscles[k].force, &most);
-        (0..=ARM_POINTS).map(at).fold(0.0, f64::max) + contact / group.rest_length
+        (0..=ARM_POINTS).map(friction).fold(0.0, f64::max) + contact / group.rest_length
     }
 
     /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest

@@ -2,7 +2,7 @@
 
 use super::memory::Memory;
 use super::ports::Acting;
-use super::rates::Plant;
+use super::rates::{Plant, Scratch};
 use super::units::Group;
 use crate::blocks::joint::JointPoint;
 use crate::effects::{At, AtMuscle};
@@ -15,6 +15,9 @@ pub(super) struct MuscleShape<S> {
     pub contraction: S,
     pub table: TablePoint<S>,
 }
+
+/// Contraction ratios between which a stiffness is taken.
+const NEAR: f64 = 1e-4;
 
 /// Write down what an effect with states acts on [N], where its first state stands.
 #[inline]
@@ -57,22 +60,15 @@ impl<S: Scalar> Plant<'_, S> {
         (group.joint.eval(angle).shortening + given) / group.rest_length
     }
 
-    /// Rate [m/s] at which gives what is between the muscles of a group and their load, at a point
-    /// of their joint under the force of all of them [N], which is written to `felt`.
-    pub(super) fn give_rate(
-        &self,
-        k: usize,
-        group: &Group,
-        state: &[S],
-        point: &JointPoint<S>,
-        force: S,
-        felt: &mut [S],
-    ) -> S {
+    /// Rate [m/s] at which gives what is between the muscles of a group and their load, under the
+    /// force of all of them [N].
+    pub(super) fn give_rate(&self, k: usize, state: &[S], force: S, here: &mut Scratch<S>) -> S {
         let mut rate = [constant(0.0)];
         if let Some(acting) = &self.wiring.ports.muscles[k].give {
-            let force = force / group.count;
-            feel(acting, force, felt);
-            let at = At::Muscle(AtMuscle { force, ..self.at_muscle(k, group, state, point) });
+            let force = force / self.wiring.groups[k].count;
+            feel(acting, force, &mut here.felt);
+            let stiffness = self.stiffness_by_give(k, state);
+            let at = At::Muscle(AtMuscle { force, stiffness, ..self.at_group(k, state) });
             self.effect(acting).rates(&at, self.own(acting, state), &mut rate);
         }
         rate[0]
@@ -169,14 +165,34 @@ impl<S: Scalar> Plant<'_, S> {
         point: &JointPoint<S>,
     ) -> AtMuscle<S> {
         let shortening = self.shortening(k, point, state);
+        let gauge = state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure;
+        let contraction = shortening / group.rest_length;
         AtMuscle {
-            gauge: state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure,
-            contraction: shortening / group.rest_length,
+            gauge,
+            contraction,
             length: -shortening + group.rest_length,
             rate: -(point.moment_arm * state[self.layout.rate(group.coordinate)]),
             stretched: constant(0.0),
             force: constant(0.0),
+            stiffness: constant(0.0),
         }
+    }
+
+    /// Stiffness of one muscle with its air [N/m], where something gives between it and its load.
+    pub(super) fn stiffness_by_give(&self, k: usize, state: &[S]) -> S {
+        if self.wiring.ports.muscles[k].give.is_none() {
+            return constant(0.0);
+        }
+        let group = &self.wiring.groups[k];
+        let (muscle, e) = (&group.muscle, self.contraction(k, state));
+        let pressure = state[self.layout.pressure(group.chamber)];
+        let gauge = pressure - self.rig.gas.ambient_pressure;
+        let pull = |e: S| muscle.pull(&muscle.table.eval(e), gauge, e, self.scales[k]);
+        let fall = (pull(e - NEAR) - pull(e)) / (NEAR * group.rest_length);
+        let of_muscle = if fall.re() > 0.0 { fall } else { constant(0.0) };
+        let swept = muscle.table.eval(e).volume_slope / group.rest_length;
+        let held = self.alphas[group.chamber].volume * pressure * group.count;
+        of_muscle + held * swept * swept / self.volume(group.chamber, state)
     }
 
     /// The same for a group by its number.

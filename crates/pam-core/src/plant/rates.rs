@@ -492,7 +492,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
                 let force = self.muscle_force(k, group, state, &memory[k], start[k], &muscle, felt);
                 (here.contraction[k], here.force[k]) = (muscle.contraction, force);
                 if self.altered.gives {
-                    let rate = self.give_rate(k, group, state, &muscle.point, force, felt);
+                    let rate = self.give_rate(k, state, force, here);
                     here.volume_rate[group.chamber] +=
                         muscle.table.volume_slope * rate * (group.count / group.rest_length);
                     here.muscle_work += force * rate;

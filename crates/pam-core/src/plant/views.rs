@@ -93,7 +93,8 @@ impl<S: Scalar> Plant<'_, S> {
             Place::Gas(k) => self.at_chamber(k, state, spool, here.volume_rate[k]),
             Place::Group(k) => {
                 let force = here.felt.get(acting.first).copied().unwrap_or(constant(0.0));
-                At::Muscle(AtMuscle { force, ..self.at_group(k, state) })
+                let stiffness = self.stiffness_by_give(k, state);
+                At::Muscle(AtMuscle { force, stiffness, ..self.at_group(k, state) })
             }
             Place::Joint(k) => self.at_joint(k, state, here.load[k]),
             Place::Whole => {

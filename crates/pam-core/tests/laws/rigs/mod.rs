@@ -413,13 +413,13 @@ pub const FORMS: &[Typical] = &[
     formed(
         "muscle_creep",
         "force_relaxation",
-        &[("share", 0.1), ("time_constant", 0.3)],
+        &[("share", 0.1), ("time_constant", 0.3), ("relaxed", 0.4)],
         &[("share", 0.0)],
     ),
     formed(
         "muscle_creep",
         "bladder_relaxation",
-        &[("share", 0.3), ("time_constant", 0.3)],
+        &[("share", 0.3), ("time_constant", 0.3), ("relaxed", 0.4)],
         &[("share", 0.0)],
     ),
     formed(
