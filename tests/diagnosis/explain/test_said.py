@@ -271,6 +271,35 @@ def test_a_name_whose_value_is_not_determined_does_not_lead() -> None:
     assert left == chances | {alone.hypothesis: 0.15, UNLISTED: 0.25}
 
 
+@pytest.mark.parametrize(("together", "kept"), [(0.99, 0.9), (0.0, 0.45)])
+def test_a_size_is_as_uncertain_as_its_shape_and_yet_determined(
+    monkeypatch: pytest.MonkeyPatch, together: float, kept: float
+) -> None:
+    """A stiffness of 500 +- 600 N/m of a creep whose time constant is as uncertain: together they
+    are known, alone the stiffness is not.
+    """
+    problem, own = leak_group(3e-9)
+    base, leak = own.candidates
+    names = ["muscle_creep.stiffness", "muscle_creep.time_constant"]
+    std = dict(zip(names, (300.0, 2.0), strict=True))  # stated twice as wide
+    monkeypatch.setattr(
+        "pamrs.diagnosis.evidence._determined.spread_over_pieces", lambda problem, found: std
+    )
+    creep = replace(
+        leak.fit,
+        rig=RIG.with_effect("muscle_creep", {"stiffness": 500.0}),
+        values=dict(zip(names, (500.0, 3.0), strict=True)),
+        scales=dict(zip(names, (500.0, 3.0), strict=True)),
+        covariance=np.array([[1.0, together], [together, 1.0]]),
+    )
+    named = replace(leak, effects=(Term("muscle_creep"),), fit=creep)
+    chances = {named.hypothesis: 0.9, UNLISTED: 0.1}
+    left = drop_undetermined(
+        replace(own, candidates=[base, named], probabilities=chances), problem
+    ).probabilities
+    assert left[named.hypothesis] == pytest.approx(kept)
+
+
 @pytest.mark.parametrize(("std", "kept"), [(0.5, 0.9), (2.5, 0.0)])
 def test_a_wrong_value_that_is_not_determined_is_no_name_in_noise(
     monkeypatch: pytest.MonkeyPatch, std: float, kept: float

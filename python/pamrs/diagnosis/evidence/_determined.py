@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -24,57 +25,60 @@ def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
     """True where a wrong value may be inside its tolerances (`walls` of them), or all sizes of an
     effect together may be zero, within two standard deviations. A fit that goes on with such an
     effect may end lower without the effect's doing.
-
-    Two sizes that do nearly the same may each be as uncertain as it is large, and their sum known
-    well. The shape is taken as it was fitted: that of what is not there is anything.
     """
     fitted = candidate.fit
     if may_be_inside(candidate, walls, SAME_STDS):
         return True
     if fitted.events is not None:
         return False
-    names = list(fitted.values)
-    for effect in candidate.effects:
-        names_of = [name for name in names if effect_of(name) == effect]
-        sizes = np.isin(names_of, fitted_sizes(fitted, effect))
-        if not sizes.any():
-            continue
-        at = [names.index(name) for name in names_of]
-        values = np.array([fitted.values[n] / fitted.scales[n] for n in names_of])[sizes]
-        spread = fitted.covariance[np.ix_(at, at)]
-        certain = np.any((values != 0.0) & (np.diag(spread)[sizes] == 0.0))
-        distance = values @ np.linalg.pinv(spread, hermitian=True)[np.ix_(sizes, sizes)] @ values
-        if not certain and is_near_none(distance, values.size, SAME_STDS):
-            return True
-    return False
+    return any(_may_be_none(fitted, effect, SAME_STDS) for effect in candidate.effects)
 
 
 def has_undetermined_effect(candidate: FittedHypothesis) -> bool:
-    """True where all fitted sizes of an effect together are within one standard deviation of zero.
-    Effects with times of their own are left out: these times determine them.
-
-    Whatever happened at times of its own in single recordings is determined by when it happened.
+    """True where all fitted sizes of an effect together are within one stated standard deviation of
+    zero. Whatever happened at times of its own in single recordings is determined by when it
+    happened.
     """
     fitted = candidate.fit
     happened = None if fitted.events is None else fitted.events.effect
-    names = list(fitted.values)
-    for effect in (e for e in candidate.effects if e != happened):
-        sizes = fitted_sizes(fitted, effect)
-        if not sizes:
-            continue
-        at = [names.index(name) for name in sizes]
-        values, std = np.array([(fitted.values[n], fitted.std[n]) for n in sizes]).T
-        spread = fitted.covariance[np.ix_(at, at)]
-        narrow = np.sqrt(np.diag(spread))
-        if not (np.isfinite(std).all() and (narrow > 0.0).all()):
-            if not np.isfinite(std).any():
-                return True
-            continue
-        spread = spread * np.outer(std / narrow, std / narrow)
-        distance = values @ np.linalg.pinv(spread, hermitian=True) @ values
-        if is_near_none(distance, len(sizes), _DETERMINED_STDS):
-            return True
-    return False
+    return any(
+        _may_be_none(fitted, effect, _DETERMINED_STDS, fitted.std)
+        for effect in candidate.effects
+        if effect != happened
+    )
+
+
+def _may_be_none(
+    fitted: Fit, effect: Term, stds: float, stated: Mapping[str, float] | None = None
+) -> bool:
+    """True where all sizes of an effect together may be zero, by the covariance of its fit, or by
+    one as wide as stated standard deviations [SI].
+
+    Two sizes that do nearly the same may each be as uncertain as it is large, and their sum known
+    well. The shape is taken as it was fitted: that of what is not there is anything, and the size
+    of a stop that is there is as uncertain as its exponent.
+    """
+    names, sizes = list(fitted.values), fitted_sizes(fitted, effect)
+    if stated is not None and not any(math.isfinite(stated[name]) for name in sizes):
+        return bool(sizes)
+    own = [name for name in names if effect_of(name) == effect]
+    if stated is not None:
+        if not all(math.isfinite(stated[name]) for name in sizes):
+            return False
+        own = [name for name in own if math.isfinite(stated[name])]
+    at = [names.index(name) for name in own]
+    spread, scales = fitted.covariance[np.ix_(at, at)], np.array([fitted.scales[n] for n in own])
+    narrow = np.sqrt(np.diag(spread))
+    if stated is not None:
+        std = np.array([stated[name] for name in own]) / scales
+        wider = np.divide(std, narrow, out=np.ones_like(std), where=narrow > 0.0)
+        spread = spread * np.outer(wider, wider)
+    is_size = np.isin(own, sizes)
+    values = np.array([fitted.values[name] for name in own]) / scales
+    if not sizes or np.any(is_size & (values != 0.0) & (narrow == 0.0)):
+        return False  # nothing to be zero, or certain
+    known = np.linalg.pinv(spread, hermitian=True)[np.ix_(is_size, is_size)]
+    return is_near_none(values[is_size] @ known @ values[is_size], len(sizes), stds)
 
 
 def fitted_sizes(fitted: Fit, effect: Term) -> list[str]:
