@@ -25,10 +25,10 @@ PACKAGES = {
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11160,
+    "diagnosis": 11148,
     "effects": 404,
     "experiments": 1078,
-    "findings": 949,
+    "findings": 960,
     "fit": 2936,
     "library": 71,
     "recordings": 5019,
@@ -41,15 +41,15 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27932,
+    "tests": 27947,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
-    "trial": 5714,
+    "trial": 5716,
     "trial/tests": 1235,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37311
+MOST = 37310
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -42,43 +41,36 @@ def has_undetermined_effect(candidate: FittedHypothesis) -> bool:
     fitted = candidate.fit
     happened = None if fitted.events is None else fitted.events.effect
     return any(
-        _may_be_none(fitted, effect, _DETERMINED_STDS, fitted.std)
+        _may_be_none(fitted, effect, _DETERMINED_STDS)
         for effect in candidate.effects
         if effect != happened
     )
 
 
-def _may_be_none(
-    fitted: Fit, effect: Term, stds: float, stated: Mapping[str, float] | None = None
-) -> bool:
-    """True where all sizes of an effect together may be zero, by the covariance of its fit, or by
-    one as wide as stated standard deviations [SI].
+def _may_be_none(fitted: Fit, effect: Term, stds: float) -> bool:
+    """True where all sizes of an effect together may be zero, by the covariance of its fit, as wide
+    as its standard deviations are now.
 
     Two sizes that do nearly the same may each be as uncertain as it is large, and their sum known
     well. The shape is taken as it was fitted: that of what is not there is anything, and the size
     of a stop that is there is as uncertain as its exponent.
     """
     names, sizes = list(fitted.values), fitted_sizes(fitted, effect)
-    if stated is not None and not any(math.isfinite(stated[name]) for name in sizes):
-        return bool(sizes)
-    own = [name for name in names if effect_of(name) == effect]
-    if stated is not None:
-        if not all(math.isfinite(stated[name]) for name in sizes):
-            return False
-        own = [name for name in own if math.isfinite(stated[name])]
-    at = [names.index(name) for name in own]
-    spread, scales = fitted.covariance[np.ix_(at, at)], np.array([fitted.scales[n] for n in own])
+    finite = {name for name, std in fitted.std.items() if math.isfinite(std)}
+    if not finite.issuperset(sizes):
+        return finite.isdisjoint(sizes)
+    own = [name for name in names if effect_of(name) == effect and name in finite]
+    at, is_size = [names.index(name) for name in own], np.isin(own, sizes)
+    values, std = ([of[n] / fitted.scales[n] for n in own] for of in (fitted.values, fitted.std))
+    spread = fitted.covariance[np.ix_(at, at)]
     narrow = np.sqrt(np.diag(spread))
-    if stated is not None:
-        std = np.array([stated[name] for name in own]) / scales
-        wider = np.divide(std, narrow, out=np.ones_like(std), where=narrow > 0.0)
-        spread = spread * np.outer(wider, wider)
-    is_size = np.isin(own, sizes)
-    values = np.array([fitted.values[name] for name in own]) / scales
-    if not sizes or np.any(is_size & (values != 0.0) & (narrow == 0.0)):
+    if not (narrow[is_size] > 0.0).any():
         return False  # nothing to be zero, or certain
-    known = np.linalg.pinv(spread, hermitian=True)[np.ix_(is_size, is_size)]
-    return is_near_none(values[is_size] @ known @ values[is_size], len(sizes), stds)
+    wider = np.divide(std, narrow, out=np.ones_like(narrow), where=narrow > 0.0)
+    known = np.linalg.pinv(spread * np.outer(wider, wider), hermitian=True)
+    size = np.array(values)[is_size]
+    distance = size @ known[np.ix_(is_size, is_size)] @ size
+    return is_near_none(distance, len(sizes), stds)
 
 
 def fitted_sizes(fitted: Fit, effect: Term) -> list[str]:
