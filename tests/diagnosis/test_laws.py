@@ -53,7 +53,8 @@ def test_the_law_that_the_recordings_follow_is_named(name: str, other: str) -> N
         (name, other, choice.stated)
     ]
     assert (found.verdict, found.answer.named) == ("parameters", []), found.summary()
-    assert f"{name} = {choice.stated}, not {other}" in found.headline
+    for said in (found.headline, found.text):
+        assert said.startswith(f"With {name} = {choice.stated}, not {other}")
     assert found.rig is not None
     kind, key = name.split(".")
     assert {table[key] for table in found.rig.tables(kind).values()} == {choice.stated}

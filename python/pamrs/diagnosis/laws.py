@@ -15,6 +15,7 @@ from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import refitted
 from pamrs.errors import PamrsError
 from pamrs.findings import BlockMismatch, ChannelError, FreeRun, OtherLaw, Trace
+from pamrs.report.sentences import law_sentence
 from pamrs.rig import OtherChoice, Rig, other_choices
 
 _BETTER = 0.5  # share of a squared error that another law leaves, from which it is looked at
@@ -111,6 +112,7 @@ def under(choice: OtherChoice, other: Diagnosis, stated: Diagnosis) -> Diagnosis
     runs = None if other.free_run is None else _runs(other.free_run, stated.free_run or [])
     return replace(
         other,
+        text=f"{law_sentence(law)}. With it: {other.text}",
         laws=[law],
         fit=fit,
         traces=_traces(other.traces, stated.traces),
