@@ -56,16 +56,16 @@ def _may_be_none(fitted: Fit, effect: Term, stds: float) -> bool:
     of a stop that is there is as uncertain as its exponent.
     """
     names, sizes = list(fitted.values), fitted_sizes(fitted, effect)
-    finite = {name for name, std in fitted.std.items() if math.isfinite(std)}
-    if not finite.issuperset(sizes):
-        return finite.isdisjoint(sizes)
-    own = [name for name in names if effect_of(name) == effect and name in finite]
+    unknown = {name for name, std in fitted.std.items() if not math.isfinite(std)}
+    if not unknown.isdisjoint(sizes):
+        return unknown.issuperset(sizes)
+    own = [name for name in names if effect_of(name) == effect and name not in unknown]
     at, is_size = [names.index(name) for name in own], np.isin(own, sizes)
-    values, std = ([of[n] / fitted.scales[n] for n in own] for of in (fitted.values, fitted.std))
     spread = fitted.covariance[np.ix_(at, at)]
     narrow = np.sqrt(np.diag(spread))
     if not (narrow[is_size] > 0.0).any():
         return False  # nothing to be zero, or certain
+    values, std = ([of[n] / fitted.scales[n] for n in own] for of in (fitted.values, fitted.std))
     wider = np.divide(std, narrow, out=np.ones_like(narrow), where=narrow > 0.0)
     known = np.linalg.pinv(spread * np.outer(wider, wider), hermitian=True)
     size = np.array(values)[is_size]
