@@ -343,8 +343,7 @@ def _missed_by_whole(groups: Sequence[BlockVerdict], runs: Sequence[FreeRun]) ->
     worst: dict[str, Missed] = {}
     off_channels = [(c, e) for run in runs for c, e in run.channels.items() if e.off and e.noise]
     for channel, error in off_channels:
-        own = own_errors.get(channel, 0.0)
-        own = _expected_error(groups, error.before, error.after, own)
+        own = _expected_error(groups, error.before, error.after, own_errors.get(channel, 0.0))
         more = beyond(error.after, error.noise or 0.0, own)
         if more > max(MOST_MISSED, worst[channel].beyond if channel in worst else 0.0):
             sizes = (error.after, error.before, error.noises)

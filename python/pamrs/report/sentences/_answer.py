@@ -146,8 +146,13 @@ def title(diagnosis: Findings) -> str:
         for part in parts[1:]
         if not (part.sure and part.group.wrong_parameters and part.names == parts[0].names)
     ]
-    acts = "in" if all(part.sure for part in other) else "may act in"
-    end = f"; something else {acts} the {listed([*map(place, other)], most=2)}" * bool(other)
+    nameless = [part.sure and part.words == ("unlisted",) for part in other]
+    what = (
+        ("an effect outside the catalogue" if all(nameless) else "something else")
+        + ", in part outside the catalogue," * (any(nameless) and not all(nameless))
+        + (" in" if all(part.sure for part in other) else " may act in")
+    )
+    end = f"; {what} the {listed([*map(place, other)], most=2)}" * bool(other)
     end += "".join(f", with {law.name} = {law.other}" for law in diagnosis.laws[:1])
     every = (_phrase(diagnosis, parts[0], most) + end for most in (3, 2, 1))
     short = (sentence for sentence in every if len(sentence.split()) <= LONGEST)
