@@ -76,9 +76,9 @@ from pamrs.findings._missing import MissingInput, MissingRecording, MissingTime,
 
 __all__ = [
     "DETECTED",
+    "FORM_ERROR",
     "HEALTHY",
     "MENDED",
-    "FORM_ERROR",
     "MOST_MISSED",
     "NOISE_LEVELS",
     "NOT_JUDGED",
