@@ -150,7 +150,7 @@ pub struct AtMuscle<S> {
     /// with states see it in [`Effect::start`] and [`Effect::rates`].
     pub force: S,
     /// Fall of the force of one muscle without effects with its shortening, and of its air [N/m];
-    /// none where nothing gives between it and its load.
+    /// only what gives between it and its load sees it.
     pub stiffness: S,
 }
 

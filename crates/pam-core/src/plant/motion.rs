@@ -2,9 +2,9 @@
 //! that gives way.
 
 use crate::dual::Slope;
-use crate::muscle::TablePoint;
 
 use super::body::Body;
+use super::muscle_force::air_stiffness;
 use super::ports::{Acting, Place};
 use super::rates::{Plant, Scratch};
 use super::units::{BodyUnit, Group};
@@ -249,21 +249,6 @@ impl Plant<'_, f64> {
         rates.fold(0.0, f64::max)
     }
 
-    /// Stiffness of the air in the muscles of a group where their shortening is `arm` times a
-    /// motion: [N/m] for a motion of the muscles themselves, [N m/rad] for one of a joint.
-    fn air_stiffness(
-        &self,
-        group: &Group,
-        table: &TablePoint<Slope>,
-        arm: f64,
-        pressure: f64,
-    ) -> f64 {
-        let volume = (self.fixed_volume[group.chamber] + table.volume.re.max(0.0) * group.count)
-            .max(f64::MIN_POSITIVE);
-        let swept = table.volume_slope.re * arm * group.count / group.rest_length;
-        self.alphas[group.chamber].volume * pressure * swept * swept / volume
-    }
-
     /// Largest stiffness that friction and contacts add to one muscle of a group [N/m] at the highest
     /// pressure.
     fn further_stiffness(&self, k: usize) -> f64 {
@@ -304,7 +289,12 @@ impl Plant<'_, f64> {
                 };
                 let torque = pull(self.scales[k]) * point.torque_arm;
                 let arm = point.moment_arm.re.abs();
-                let air = self.air_stiffness(group, &table, arm, pressure);
+                let volume = (self.fixed_volume[group.chamber]
+                    + table.volume.re.max(0.0) * group.count)
+                    .max(f64::MIN_POSITIVE);
+                let swept = table.volume_slope.re * arm * group.count / group.rest_length;
+                let alpha = self.alphas[group.chamber].volume;
+                let air = air_stiffness(alpha, pressure, swept, volume);
                 let friction = self.presliding_stiffness(k, group, pull(1.0).re.abs(), gauge);
                 most = most.max(group.count * (torque.slope().abs() + friction * arm * arm) + air);
             }

@@ -19,6 +19,12 @@ pub(super) struct MuscleShape<S> {
 /// Contraction ratios between which a stiffness is taken.
 const NEAR: f64 = 1e-4;
 
+/// Stiffness of a gas against a motion that sweeps so much of its volume: [N/m] for [m2], [N m/rad]
+/// for [m3/rad].
+pub(super) fn air_stiffness<S: Scalar>(alpha: S, pressure: S, swept: S, volume: S) -> S {
+    alpha * pressure * swept * swept / volume
+}
+
 /// Write down what an effect with states acts on [N], where its first state stands.
 #[inline]
 fn feel<S: Scalar>(acting: &Acting, force: S, felt: &mut [S]) {
@@ -65,10 +71,8 @@ impl<S: Scalar> Plant<'_, S> {
     pub(super) fn give_rate(&self, k: usize, state: &[S], force: S, here: &mut Scratch<S>) -> S {
         let mut rate = [constant(0.0)];
         if let Some(acting) = &self.wiring.ports.muscles[k].give {
-            let force = force / self.wiring.groups[k].count;
-            feel(acting, force, &mut here.felt);
-            let stiffness = self.stiffness_by_give(k, state);
-            let at = At::Muscle(AtMuscle { force, stiffness, ..self.at_group(k, state) });
+            feel(acting, force / self.wiring.groups[k].count, &mut here.felt);
+            let at = At::Muscle(self.at_felt(k, acting, state, &here.felt));
             self.effect(acting).rates(&at, self.own(acting, state), &mut rate);
         }
         rate[0]
@@ -165,11 +169,9 @@ impl<S: Scalar> Plant<'_, S> {
         point: &JointPoint<S>,
     ) -> AtMuscle<S> {
         let shortening = self.shortening(k, point, state);
-        let gauge = state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure;
-        let contraction = shortening / group.rest_length;
         AtMuscle {
-            gauge,
-            contraction,
+            gauge: state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure,
+            contraction: shortening / group.rest_length,
             length: -shortening + group.rest_length,
             rate: -(point.moment_arm * state[self.layout.rate(group.coordinate)]),
             stretched: constant(0.0),
@@ -178,11 +180,31 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// Stiffness of one muscle with its air [N/m], where something gives between it and its load.
-    pub(super) fn stiffness_by_give(&self, k: usize, state: &[S]) -> S {
-        if self.wiring.ports.muscles[k].give.is_none() {
-            return constant(0.0);
-        }
+    /// The same for a group by its number.
+    fn at_group(&self, k: usize, state: &[S]) -> AtMuscle<S> {
+        let group = &self.wiring.groups[k];
+        let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
+        self.at_muscle(k, group, state, &point)
+    }
+
+    /// The same for an effect with states, with the force that was written down for it.
+    pub(super) fn at_felt(
+        &self,
+        k: usize,
+        acting: &Acting,
+        state: &[S],
+        felt: &[S],
+    ) -> AtMuscle<S> {
+        let force = felt.get(acting.first).copied().unwrap_or(constant(0.0));
+        let stiffness = match &self.wiring.ports.muscles[k].give {
+            Some(give) if give.effect == acting.effect => self.stiffness_with_air(k, state),
+            _ => constant(0.0),
+        };
+        AtMuscle { force, stiffness, ..self.at_group(k, state) }
+    }
+
+    /// Stiffness of one muscle of a group with its air [N/m].
+    fn stiffness_with_air(&self, k: usize, state: &[S]) -> S {
         let group = &self.wiring.groups[k];
         let (muscle, e) = (&group.muscle, self.contraction(k, state));
         let pressure = state[self.layout.pressure(group.chamber)];
@@ -190,16 +212,10 @@ impl<S: Scalar> Plant<'_, S> {
         let pull = |e: S| muscle.pull(&muscle.table.eval(e), gauge, e, self.scales[k]);
         let fall = (pull(e - NEAR) - pull(e)) / (NEAR * group.rest_length);
         let of_muscle = if fall.re() > 0.0 { fall } else { constant(0.0) };
-        let swept = muscle.table.eval(e).volume_slope / group.rest_length;
-        let held = self.alphas[group.chamber].volume * pressure * group.count;
-        of_muscle + held * swept * swept / self.volume(group.chamber, state)
-    }
-
-    /// The same for a group by its number.
-    pub(super) fn at_group(&self, k: usize, state: &[S]) -> AtMuscle<S> {
-        let group = &self.wiring.groups[k];
-        let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
-        self.at_muscle(k, group, state, &point)
+        let swept = muscle.table.eval(e).volume_slope * group.count / group.rest_length;
+        let (alpha, volume) =
+            (self.alphas[group.chamber].volume, self.volume(group.chamber, state));
+        of_muscle + air_stiffness(alpha, pressure, swept, volume) / group.count
     }
 
     /// Contraction ratio of each group at a state.

@@ -3,7 +3,7 @@
 use super::ports::{Acting, Place};
 use super::rates::{Controls, Plant, Scratch, Simulated};
 use super::units::Node;
-use crate::effects::{At, AtMuscle, Port, BAR};
+use crate::effects::{At, Port, BAR};
 use crate::scalar::{constant, Scalar};
 
 /// Steps to where what gives is at rest with its muscle: a secant needs a dozen, halves 50.
@@ -91,11 +91,7 @@ impl<S: Scalar> Plant<'_, S> {
             }
             Place::Line(k) => At::Valve { fed: self.pressure_at(self.wiring.lines[k].to, state) },
             Place::Gas(k) => self.at_chamber(k, state, spool, here.volume_rate[k]),
-            Place::Group(k) => {
-                let force = here.felt.get(acting.first).copied().unwrap_or(constant(0.0));
-                let stiffness = self.stiffness_by_give(k, state);
-                At::Muscle(AtMuscle { force, stiffness, ..self.at_group(k, state) })
-            }
+            Place::Group(k) => At::Muscle(self.at_felt(k, acting, state, &here.felt)),
             Place::Joint(k) => self.at_joint(k, state, here.load[k]),
             Place::Whole => {
                 let angles = &state[self.layout.angle(0)..self.layout.rate(0)];
