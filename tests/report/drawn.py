@@ -26,13 +26,14 @@ from pamrs.findings import (
     FreeRunError,
     MismatchSize,
     MismatchStages,
+    OtherLaw,
     ParameterFound,
     Unexplained,
     Where,
     WrongParameter,
     left_of,
 )
-from pamrs.report.sentences import verdict
+from pamrs.report.sentences import law_sentence, verdict
 from tests.diagnosis.asked import SETTINGS
 from tests.diagnosis.evidence.test_verdicts import RIG, group
 
@@ -99,7 +100,18 @@ def findings(draw: st.DrawFn) -> Diagnosis:
         runs = [FreeRun("log", "held_out", 10.0, errors)]
     held = draw(st.booleans())
     fit = FitErrors(table, table if held else {}, None)
-    return _finished(judged, entries, fit, runs)
+    found = _finished(judged, entries, fit, runs)
+    return _under_another_law(found) if draw(st.booleans()) else found
+
+
+def _under_another_law(found: Diagnosis) -> Diagnosis:
+    """A result under a law that the rig file does not choose."""
+    channel, error = next(iter(found.proven.items()))
+    unit = next(unit for name, unit, _ in CHANNELS.values() if name == channel)
+    sizes = (2.0 * error.refit, error.refit, error.noise)
+    law = OtherLaw("chamber.gas", "isothermal", "energy_balance", channel, unit, *sizes)
+    text = f"{law_sentence(law)}. With it: {found.text}"
+    return _assemble.answered(replace(found, laws=[law], text=text))
 
 
 def _entry(

@@ -16,6 +16,7 @@ import pamrs
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.findings import HEALTHY
 from pamrs.report import render_html, sentences, words
+from pamrs.report.sentences import law_sentence
 
 _OPEN = (
     r"\bmay\b|not ruled out|still misses|that the model leaves out|\) or | or \d+ more"
@@ -38,6 +39,7 @@ _BADGES = {
     "a channel is in another unit": ("units", False),
 }
 """Verdict and whether it is settled, of each badge; empty where it does not say."""
+_HEALTHY_BADGES = ("nothing missing", "parameters inside their tolerances")
 _LEFT = {
     "noise": ("only noise is left", "noise only", "fits to the noise"),
     "error": ("inside the usual error", "inside its usual error", "usual error: "),
@@ -84,6 +86,7 @@ def _of_json(found: Diagnosis) -> list[Statement]:
     content = json.loads(found.to_json())
     answer, verdict = content["answer"], content["verdict"]
     wrong = {w["name"] for w in content["wrong_parameters"]}
+    other_law = bool(content["laws"])
     effects = {e.term for e in found.effects} if verdict == "effects" else set[str]()
     told = [
         Statement("verdict", verdict, "verdict"),
@@ -92,7 +95,7 @@ def _of_json(found: Diagnosis) -> list[Statement]:
         Statement("place", content["where"]["block"], "where"),
         Statement("place", answer["block"], "answer"),
         Statement("names", effects | wrong, "effects and wrong values"),
-        Statement("missing", bool(wrong) or verdict not in HEALTHY, "verdict"),
+        Statement("missing", bool(wrong) or other_law or verdict not in HEALTHY, "verdict"),
         Statement("missed", {m["channel"] for m in answer["missed"]}, "answer"),
     ]
     judged = found.judged
@@ -102,7 +105,7 @@ def _of_json(found: Diagnosis) -> list[Statement]:
     if len(content["ambiguity"]) > 1:
         told.append(Statement("settled", False, "ambiguity"))
     chances = content["probabilities"]
-    if answer["settled"] and chances:
+    if answer["settled"] and chances and not other_law:
         healthy = sum(chances.get(key) or 0.0 for key in HEALTHY)
         told.append(Statement("missing", healthy < 0.5, "probabilities"))
     if found.unexplained or answer["missed"]:
@@ -116,6 +119,8 @@ def _of_headlines(found: Diagnosis, page: str, summary: str) -> list[Statement]:
     assert badge is not None
     verdict, sure = _BADGES[badge[1]]
     told = [Statement("settled", sure, "badge")]
+    if sure:
+        told.append(Statement("missing", badge[1] not in _HEALTHY_BADGES, "badge"))
     if verdict:
         # of a value beside physics without a name the badge says the physics
         told.append(Statement("verdict", verdict, "badge"))
@@ -123,8 +128,9 @@ def _of_headlines(found: Diagnosis, page: str, summary: str) -> list[Statement]:
         return told
     missed = {m.channel for m in found.answer.missed}
     for source, text in (("headline", found.headline), ("title", sentences.title(found))):
-        for own in found.faulty:  # said before
-            text = text.removeprefix(f"{own.text}. ")
+        said_before = [*(own.text for own in found.faulty), *map(law_sentence, found.laws)]
+        for own in said_before:
+            text = text.removeprefix(f"{own}. ")
         sure = re.search(_OPEN, text.replace("alone or with others", "")) is None
         told.append(Statement("settled", sure, source))
         healthy = text.startswith(("Nothing is missing", "No physics is missing"))

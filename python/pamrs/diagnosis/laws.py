@@ -13,6 +13,7 @@ from pamrs.diagnosis.noise import no_inflation
 from pamrs.diagnosis.prepare import Unjudged
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import refitted
+from pamrs.effects import EFFECTS
 from pamrs.errors import PamrsError
 from pamrs.findings import BlockMismatch, ChannelError, FreeRun, OtherLaw, Trace
 from pamrs.report.sentences import law_sentence
@@ -51,6 +52,8 @@ def promising_laws(
         names = [b.name for b in blocks]
         stated = _missed(rig, problem, names)
         for choice in other_choices(rig, ("muscle",) if mechanical else ("chamber", "valve")):
+            if _is_an_effect(choice):
+                continue
             try:
                 divided = prepared(choice.rig)
                 missed = _missed(choice.rig, divided[0], names)
@@ -58,6 +61,13 @@ def promising_laws(
                 continue  # a rig that these recordings cannot be of
             if missed < _BETTER * stated:
                 yield choice, divided
+
+
+def _is_an_effect(choice: OtherChoice) -> bool:
+    """True where the other law is the equation of an effect, which has its name and rivals then."""
+    kind = choice.name.partition(".")[0]
+    own = (effect for effect in EFFECTS.values() if effect.block == kind)
+    return any(form.name == choice.other for effect in own for form in effect.forms)
 
 
 def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:

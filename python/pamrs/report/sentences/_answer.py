@@ -98,7 +98,8 @@ def case_badge(diagnosis: Findings) -> str:
     answer = diagnosis.answer
     if answer.missed:
         return _MORE[bool(answer.named)]
-    return _badge(answer.verdict, answer.named, settled=answer.settled)
+    wrong = [*answer.named, *(law.name for law in diagnosis.laws)]
+    return _badge(answer.verdict, wrong, settled=answer.settled)
 
 
 def _badge(verdict: str, named: Sequence[str], *, settled: bool) -> str:

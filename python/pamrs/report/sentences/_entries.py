@@ -315,8 +315,12 @@ def left_in(diagnosis: Findings, block: str, stage: str = "after") -> str:
     own = next((m for b in diagnosis.judged for m in b.mismatch if m.block == block), None)
     if own is None:
         return ""
-    healthy = diagnosis.answer.part_of(block) in diagnosis.answer.quiet
-    return left_of(own, diagnosis.proven.get(own.channel), stage, healthy=healthy)
+    part = diagnosis.answer.part_of(block)
+    healthy = part in diagnosis.answer.quiet
+    left = left_of(own, diagnosis.proven.get(own.channel), stage, healthy=healthy)
+    # what is said to be missing is no error of the model
+    missing = left == "error" and part is not None and part.group.verdict == "unlisted"
+    return "more" if missing else left
 
 
 def _healthy_misses(diagnosis: Findings) -> Iterator[tuple[BlockMismatch, str, Miss]]:
@@ -474,13 +478,10 @@ def budgets(diagnosis: Findings) -> dict[str, list[BudgetTerm]]:
 
 def budget_sentences(diagnosis: Findings) -> list[tuple[str, str]]:
     """Each block with a budget and that in words."""
-    found = []
-    for block, own in budgets(diagnosis).items():
-        left, part = left_in(diagnosis, block), diagnosis.answer.part_of(block)
-        # what is said to be missing is no error of the model
-        missing = left == "error" and part is not None and part.group.verdict == "unlisted"
-        found.append((block, budget_sentence(own, "more" if missing else left)))
-    return found
+    return [
+        (block, budget_sentence(own, left_in(diagnosis, block)))
+        for block, own in budgets(diagnosis).items()
+    ]
 
 
 def budget_lines(diagnosis: Findings) -> list[str]:
