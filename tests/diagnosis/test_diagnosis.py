@@ -174,3 +174,23 @@ def test_printed_chambers(name: str, leaks: bool) -> None:
         assert leak < 0.9
         (slow,) = (e for e in found.effects if e.id == "leak_muscle")
         assert slow.parameters["time_constant"].value > 1e4
+
+
+@pytest.mark.parametrize(("highest", "named"), [(0.1, False), (0.3, True)])
+def test_physics_in_the_held_out_recording_alone_is_searched_there(
+    highest: float, *, named: bool
+) -> None:
+    """A stop that two small movements never reach: they prove what is fitted to the third."""
+    stopped = RIG.with_effect("joint_end_stop", {"angle": 1.6, "stiffness": 300.0})
+    time = 0.01 * np.arange(2000)
+    made = []
+    for k, size in enumerate((0.1, 0.08, highest)):
+        command = 5.0 + size * (np.sin(time) + 0.3 * np.sin(5 * time))
+        role, start = "fit" if k < 2 else "held_out", {"muscle_pressure": 2e5, "joint_angle": 0.9}
+        given = ({"valve_command": command}, SHOULDER, [k])
+        made.append(driven(stopped, "abc"[k], role, 0.01, *given, initial=start))
+    found = pamrs.diagnose(pamrs.Case("stop", RIG, made, Path()))
+    assert [e.id for e in found.effects] == ["joint_end_stop"] * named, found.summary()
+    fitted = [d.recording for d in found.data if d.role == "fit"]
+    assert fitted == (["a", "c"] if named else ["a", "b"])
+    assert any("roles were exchanged" in warning for warning in found.warnings) is named

@@ -289,6 +289,11 @@ def _diagnosis_of_checked_case(
             what, lambda: _under_best_law(case, considered, fit_problem, stated), stated
         )
         fit_problem = judged
+        exchanged = _with_exchanged_roles(checked, diagnosis)
+        if exchanged is not None:
+            other = _diagnosis_of_checked_case(exchanged, settings, considered, say)
+            if other.answer.named and not other.answer.missed:
+                return other
     # the first few are all that a terminal shows: first what may make the answer wrong
     # a unit that is found settles what was doubted under the one that was said
     doubts = checked.doubts if misread is None else []
@@ -309,6 +314,28 @@ def _diagnosis_of_checked_case(
     ]
     data = data_used(recordings, counts, fit_problem.blocks, case.rig, fit_problem.core, unjudged)
     return replace(diagnosis, warnings=warnings, data=data)
+
+
+_EXCHANGED = "held-out recordings show what the fitted ones do not: roles were exchanged"
+"""Note on a case whose recordings have other roles than were stated."""
+
+
+def _with_exchanged_roles(checked: DiagnosableCase, diagnosis: Diagnosis) -> DiagnosableCase | None:
+    """The case with its held-out recordings to be fitted and the last of the others held out, where
+    a block misses more than noise in held-out ones alone: the fitted ones have nothing to search
+    by; None elsewhere.
+    """
+    answer = diagnosis.answer
+    missed = [m.block for m in answer.missed if m.block]
+    mismatches = [m for b in diagnosis.judged for m in b.mismatch if m.block in missed]
+    shown = any(m.fitted.refit.more_than_noise for m in mismatches)
+    if not mismatches or shown or answer.named or _EXCHANGED in checked.notes:
+        return None
+    proof = checked.case.fit[-1].name
+    roles = {r.name: "held_out" if r.name == proof else "fit" for r in checked.case.recordings}
+    recordings = [replace(r, role=roles[r.name]) for r in checked.case.recordings]
+    case = replace(checked.case, recordings=recordings)
+    return replace(checked, case=case, notes=[*checked.notes, _EXCHANGED])
 
 
 def _case_of(case: Any, data: Any, rig: Any, *, allow_outside: bool) -> Case:
