@@ -228,8 +228,8 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     or of a single wrong value that may be inside its tolerances.
 
     The rest goes to ``unlisted``: something acts there, but not surely that. Where only noise was
-    left it goes to `UNDECIDED`, and a wrong value loses all. A set needs no such step: the evidence
-    of the set without the name decides.
+    left it goes to `UNDECIDED`, and a wrong value that may be inside is put aside. A set needs no
+    such step: the evidence of the set without the name decides.
 
     Returns
     -------
@@ -245,10 +245,11 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
             continue
         with_std = with_stated_std(problem, group, candidate)
         inside = may_be_inside(with_std, settings.most_tolerances)
+        if inside and to == UNDECIDED:
+            return drop_undetermined(put_aside(group, candidate.hypothesis), problem)
         if inside or has_undetermined_effect(with_std):
-            lost = 1.0 if candidate.wrong and to == UNDECIDED else 0.5
-            probabilities[candidate.hypothesis] -= lost * chance
-            probabilities[to] = probabilities.get(to, 0.0) + lost * chance
+            probabilities[candidate.hypothesis] -= 0.5 * chance
+            probabilities[to] = probabilities.get(to, 0.0) + 0.5 * chance
     return replace(group, probabilities=probabilities)
 
 
