@@ -14,6 +14,7 @@ from typing import Final
 __all__ = [
     "CHANNELS",
     "COMMANDED",
+    "DRIVEN_COMMANDS",
     "MEASURED",
     "UNITS",
     "Channel",
@@ -36,6 +37,7 @@ COMMANDED: Final = (
 MEASURED: Final = "act actual ist istwert meas measured mess messwert fb feedback sensor gauge"
 _PRESSURE: Final = "pressure druck p press air luft presion pression"
 _OUTSIDE: Final = "ambient umgebung room raum"
+_TRANSDUCER: Final = 200.0  # [Pa] noise of a usual transducer of 14 bar with a 16-bit converter
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,8 @@ class Channel:
         SI units of what it may be, where that is not `unit` alone.
     only : tuple of str, optional
         Key of the block and its value, where not every block of the kind has it.
+    noise : float
+        Standard deviation of a sample by a usual sensor, SI; 0 where no cut chain uses the channel.
     """
 
     name: str
@@ -84,6 +88,7 @@ class Channel:
     traits: str = ""
     units: tuple[str, ...] = ()
     only: tuple[str, str] | None = None
+    noise: float = 0.0
 
     @property
     def strong(self) -> frozenset[str]:
@@ -128,32 +133,34 @@ CHANNELS: Final[dict[str, Channel]] = {
             "behälter behaelter regulator regler vordruck netzdruck zuluft upstream suministro "
             "alimentacion alimentation", _PRESSURE,
             "pressure in the tank or behind the regulator", "pressure clips strong steady",
+            noise=_TRANSDUCER,
         ),
         Channel(
             "line_pressure", "Pa", -1.3e5, 1e8, "line",
             "line hose tube leitung schlauch pline", _PRESSURE,
-            "pressure between valve and hose", "pressure clips strong extra",
+            "pressure between valve and hose", "pressure clips strong extra", noise=_TRANSDUCER,
         ),
         Channel(
             "muscle_pressure", "Pa", -1.3e5, 1e8, "chamber",
             "muscle pam mckibben muskel musculo chamber kammer pm p1 pmuscle",
             f"{_PRESSURE} actuator bladder tank",
-            "pressure in the muscle or its chamber", "pressure clips needed",
+            "pressure in the muscle or its chamber", "pressure clips needed", noise=_TRANSDUCER,
         ),
         Channel(
             "joint_angle", "rad", -100.0, 100.0, "joint",
             "angle winkel angulo theta phi encoder enc", "joint position pos q elbow knee",
-            "angle of the joint", "needed rests moves",
+            "angle of the joint", "needed rests moves", noise=math.radians(0.03),  # a Hall sensor
         ),
         Channel(
             "length", "m", -100.0, 100.0, "load",
             "length laenge länge longitud longueur stroke displacement weg lvdt disp",
             "x position pos laser",
-            "length of the muscle", "needed rests moves",
+            "length of the muscle", "needed rests moves", noise=3e-5,  # a linear transducer
         ),
         Channel(
             "force", "N", -1e7, 1e7, "load", "force kraft fuerza loadcell", "load cell f fz",
             "pull of the muscles, by a load cell", "needed clips extra",
+            noise=1.0,  # a load cell of 2 to 5 kN, 0.02 to 0.05 % of its range
         ),
         Channel(
             "joint_torque", "N m", -1e7, 1e7, "joint", "torque moment drehmoment", "m mz joint",
@@ -164,7 +171,7 @@ CHANNELS: Final[dict[str, Channel]] = {
             "temperature temp temperatur thermo tc tgas tair ttank tchamber",
             "gas chamber kammer tank tgas tair ttank tchamber",
             "temperature of the gas in the muscle or its chamber", "slow named extra",
-            only=("gas", "energy_balance"),
+            only=("gas", "energy_balance"), noise=0.1,  # a thermocouple's amplifier
         ),
         Channel(
             "air_flow", "kg/s", -100.0, 100.0, "chamber",
@@ -223,6 +230,10 @@ def channel_of(name: str) -> str:
 def with_trait(trait: str) -> tuple[str, ...]:
     """The channels of recordings with a trait, in the order of the table."""
     return tuple(name for name, row in CHANNELS.items() if row.has(trait))
+
+
+#: Commands that a rig takes from recordings.
+DRIVEN_COMMANDS: Final = with_trait("driven")
 
 
 def block_of(name: str) -> str:

@@ -17,7 +17,7 @@ from pamrs import cli
 from pamrs.diagnosis import limits
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment import measurable
-from pamrs.diagnosis.next_experiment._differences import _FORCE_NOISE
+from pamrs.diagnosis.next_experiment._differences import usual_noise
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError
 from pamrs.experiments import chains_of, experiments_of, is_sealed, library, protocol_of
@@ -217,7 +217,7 @@ def test_held_lengths_show_no_friction_and_strokes_do(monkeypatch: pytest.Monkey
     assert still.seen == ()
     moved = next(a for a in still.additions if a.name == "slow_strokes")
     assert "muscle_hysteresis" in moved.seen
-    assert still.noise["force"] == _FORCE_NOISE
+    assert still.noise["force"] == usual_noise()["force"]
     quiet = {"muscle_pressure": 50.0, "length": 1e-5, "force": 0.3}
     both = made("slow_strokes", "strokes_at_speeds", noise=quiet)
     assert set(both.seen) == {"muscle_hysteresis", "muscle_rate_damping"}

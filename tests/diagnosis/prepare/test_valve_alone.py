@@ -12,7 +12,7 @@ import pamrs
 from pamrs.diagnosis import limits
 from pamrs.diagnosis.fit import acts_in
 from pamrs.diagnosis.next_experiment import _planning as plan
-from pamrs.diagnosis.next_experiment._differences import _PRESSURE_NOISE
+from pamrs.diagnosis.next_experiment._differences import usual_noise
 from pamrs.diagnosis.prepare import prepare, residual
 from pamrs.effects import EFFECTS, Term
 from pamrs.experiments import library
@@ -125,7 +125,7 @@ def test_a_plan_knows_the_gauge_in_front_of_the_line(planned) -> None:
     whole = planned(*CHANNELS)
     assert [block["name"] for block in whole.blocks] == ["supply", "line", "chamber"]
     assert whole.missing == []
-    assert whole.noise["line_pressure"] == _PRESSURE_NOISE
+    assert whole.noise["line_pressure"] == usual_noise()["muscle_pressure"]
     assert whole.limit("valve_dead_zone").verdict != "not seen"
     assert whole.limit("leak_muscle").block == "chamber"
     chamber = whole.blocks[-1]

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pamrs._arrays import Array, solve_normal
-from pamrs.channels import channel_of
+from pamrs.channels import CHANNELS, DRIVEN_COMMANDS, channel_of
 from pamrs.diagnosis.fit import Key, Problem, free_baseline, residuals
 from pamrs.diagnosis.limits import counted
 from pamrs.diagnosis.noise import (
@@ -44,29 +44,11 @@ from pamrs.simulation import Simulation, core_rig, has_frame, reading
 REPLICATES = 4
 # relative standard deviation of an effect's parameter of which a model says none
 _UNSTATED_STD_SHARE = 0.5
-# [Pa] of a pressure where no recording tells: usual 14 bar transducer, 16-bit converter
-_PRESSURE_NOISE = 200.0
-_ANGLE_NOISE = math.radians(0.03)  # [rad] of an angle: usual Hall sensor
-_LENGTH_NOISE = 3e-5  # [m] of a length: usual linear transducer
-_TEMPERATURE_NOISE = 0.1  # [K] of a gas's temperature: usual thermocouple amplifier
-_FORCE_NOISE = 1.0  # [N] of a force: usual load cell of 2 to 5 kN, 0.02 to 0.05 % of its range
-
-
-COMMANDS = ("valve_command", "supply_command")
-"""Channels that a person sends."""
-_PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
-_MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length", "force", "temperature")
-"""Channels that the cut chain uses."""
 
 
 def usual_noise() -> dict[str, float]:
     """Sample noise of usual transducers by channel [SI]."""
-    return dict.fromkeys(_PRESSURES, _PRESSURE_NOISE) | {
-        "joint_angle": _ANGLE_NOISE,
-        "length": _LENGTH_NOISE,
-        "force": _FORCE_NOISE,
-        "temperature": _TEMPERATURE_NOISE,
-    }
+    return {name: row.noise for name, row in CHANNELS.items() if row.noise}
 
 
 def noise_of(rig: Rig, given: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -87,7 +69,7 @@ def measurable(rig: Rig, kind: str = "") -> tuple[str, ...]:
     cell = ("force",) if has_frame(rig) else ()
     every = dict.fromkeys((*core.inputs, *core.channels, *cell))
     has = [name for name in every if channel_of(name) != "temperature" or name in warm]
-    kinds = (kind,) if kind else _MEASURABLE
+    kinds = (kind,) if kind else (*DRIVEN_COMMANDS, *usual_noise())
     return tuple(name for one in kinds for name in has if channel_of(name) == one)
 
 
@@ -137,7 +119,7 @@ def taken(
     rng : numpy.random.Generator, optional
         Adds that noise; none by default.
     """
-    names = [c for c in measurable(rig) if channel_of(c) in COMMANDS or c in noise]
+    names = [c for c in measurable(rig) if channel_of(c) in DRIVEN_COMMANDS or c in noise]
     channels = {c: v for c in names if (v := reading(run, c)) is not None}
     if rng is not None:
         channels = {

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.channels import block_of, channel_of, with_trait
+from pamrs.channels import DRIVEN_COMMANDS, block_of, channel_of
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -42,7 +42,6 @@ _GAUGES = ("muscle_pressure", "joint_angle")
 _GAUGE_SHARE = 0.1
 """That of a gauge's range over that of a block: gauges are linear to a tenth of a percent."""
 _MOTION = ("joint_angle", "length")
-_DRIVEN_COMMANDS = with_trait("driven")
 
 
 def curve_errors_of(rig: Rig, usual: float) -> CurveErrors:
@@ -184,7 +183,7 @@ def _flow_errors(
         return []
     name = block_of(block.channel)
     command = next(
-        (n for n in block.drives if channel_of(n) in _DRIVEN_COMMANDS and n in ranges), None
+        (n for n in block.drives if channel_of(n) in DRIVEN_COMMANDS and n in ranges), None
     )
     errors = [
         (block.channel, _shares(curve_errors, _FLOWS[block.kind], name)),

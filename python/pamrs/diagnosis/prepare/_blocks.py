@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pamrs._arrays import Array, Mask
-from pamrs.channels import block_of, channel_of, dotted
+from pamrs.channels import DRIVEN_COMMANDS, block_of, channel_of, dotted
 from pamrs.diagnosis.prepare._signals import (
-    DRIVEN_COMMANDS,
     flows_of,
     held,
     pulls_of,

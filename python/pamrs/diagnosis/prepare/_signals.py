@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 
 from pamrs import _core
 from pamrs._arrays import Array, Index, Mask, stretches
-from pamrs.channels import block_of, channel_of, dotted, with_trait
+from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError
@@ -59,7 +59,6 @@ Lengths = Index
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels at which a rig is cut, without the names of blocks."""
-DRIVEN_COMMANDS = with_trait("driven")
 
 
 @dataclass(frozen=True, eq=False)
