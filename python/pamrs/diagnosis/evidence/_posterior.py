@@ -147,7 +147,8 @@ def log_weight(
     in some blocks, less its price, its moved parameters and its rare values.
     """
     evidence = _evidence(candidate, baseline, compared, tempering) - _strain(candidate)
-    return evidence - prior.loss(candidate)
+    samples = tempering * sum(candidate.likelihood()[block.name].count for block in compared)
+    return evidence - prior.loss(candidate, samples)
 
 
 def _strain(candidate: FittedHypothesis) -> float:

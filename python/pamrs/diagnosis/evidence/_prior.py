@@ -75,17 +75,19 @@ class Prior:
     seconds: float
     settings: DiagnosisSettings
 
-    def loss(self, candidate: FittedHypothesis) -> float:
+    def loss(self, candidate: FittedHypothesis, samples: float = math.inf) -> float:
         """Log odds that a hypothesis loses before any data: its price, and rare values."""
-        return self.price(candidate) + self.rarity(candidate)
+        return self.price(candidate, samples) + self.rarity(candidate)
 
-    def price(self, candidate: FittedHypothesis) -> float:
-        """Log odds paid for names, parameters, events, possible places, and wrong values."""
+    def price(self, candidate: FittedHypothesis, samples: float = math.inf) -> float:
+        """Log odds paid for names, parameters, events, possible places, and wrong values; of the
+        parameters of events for no more than there are independent samples for them to follow.
+        """
         total = sum(self._own_price(candidate, term) for term in candidate.terms)
         total += self.settings.name_price * len(candidate.terms) + candidate.log_places
         events = candidate.fit.events
         happened = 0 if events is None else sum(len(v) for v in events.values.values())
-        return total + self.settings.parameter_price * happened
+        return total + self.settings.parameter_price * min(happened, samples)
 
     def _own_price(self, candidate: FittedHypothesis, term: Term) -> float:
         """Log odds paid for an effect's parameters, or for how far a value of the file is wrong."""

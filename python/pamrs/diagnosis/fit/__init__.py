@@ -9,8 +9,8 @@ other), `free_baseline`, `bin_width`, `Key`, `Residuals`, `Stages`;
 effect begins);
 `form_in`, `entry_of`, `with_effects_of`, `with_entry`, `without_term` (effects of a rig
 and their forms);
-`Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
-`depends`, `fits`, `places_of`, `same_data_in` (where effects act);
+`Events`, `events_of`, `fit_events`, `look_for_events`, `refit_events` (transient effects);
+`acts_in`, `concerns`, `depends`, `fits`, `places_of`, `same_data_in` (where effects act);
 `known_parameters`, `with_known` (effects that the nominal model holds, and what
 is known of all parameters); `ends_in_tolerances`, `in_tolerances`,
 `moved_value` (how far they may move); `spread_over_pieces`
@@ -70,7 +70,12 @@ from pamrs.diagnosis.fit._starts import (
     with_entry,
     without_term,
 )
-from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
+from pamrs.diagnosis.fit._transients import (
+    events_of,
+    fit_events,
+    look_for_events,
+    refit_events,
+)
 
 __all__ = [
     "FINAL_STEP_SHARE",
@@ -105,6 +110,7 @@ __all__ = [
     "known_parameters",
     "levenberg_marquardt",
     "look_for_events",
+    "refit_events",
     "moved_value",
     "parts_of",
     "places_of",

@@ -139,17 +139,36 @@ def fit_events(
             last is None or 2.0 * (last.cost - joint.cost) > _LEAST_EVENT_GAIN
         ):
             last = joint
-    if last is None:
-        return None
-    assert last.events is not None
-    first = next(iter(last.events.values.values()))
-    values = {f"{effect}.{name}": value for name, value in first.items()}
-    return replace(
-        last,
-        effects=(effect,),
-        rig=last.events.put_into(last.rig, next(iter(last.events.values))),
-        values=last.values | values,
-    )
+    return None if last is None else _complete(last)
+
+
+def refit_events(
+    fitted: Fit, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
+) -> Fit:
+    """Fit baseline and events on from where they are under another inflation; the same fit where
+    the model leaves its range.
+
+    Parameters
+    ----------
+    fitted : Fit
+        With events.
+    problem, nominal, baseline, inflation
+        As in :func:`fit_events`.
+    """
+    assert fitted.events is not None
+    values = baseline.values | {name: fitted.values[name] for name in baseline.moved}
+    begun = replace(baseline, values=values)
+    last = _fit_jointly(fitted.events, problem, nominal, begun, inflation)
+    return fitted if last is None else _complete(last)
+
+
+def _complete(fitted: Fit) -> Fit:
+    """A fit with events whose rig and values have those of the first recording."""
+    assert fitted.events is not None
+    effect, (name, first) = fitted.events.effect, next(iter(fitted.events.values.items()))
+    own = {f"{effect}.{parameter}": value for parameter, value in first.items()}
+    rig = fitted.events.put_into(fitted.rig, name)
+    return replace(fitted, effects=(effect,), rig=rig, values=fitted.values | own)
 
 
 def _in_form(events: Events, form: str) -> Events:

@@ -39,6 +39,7 @@ from pamrs.diagnosis.fit import (
     places_of,
     predicted_by_others,
     predicted_with_doubt,
+    refit_events,
     residuals,
     start_of,
     with_effects_of,
@@ -181,8 +182,11 @@ class Attempts:
         fitted = fit_events(effect, self.fit_problem, model, candidate.fit, no_inflation)
         if fitted is None:
             return None
+        inflation = self.inflation_of(fitted)
         if candidate.effects:
             fitted = self._fit_in_turn(fitted, candidate, no_inflation)
+        elif inflation.largest > CORRELATED_VARIANCE:
+            fitted = refit_events(fitted, self.fit_problem, model, candidate.fit, inflation)
         effects = (*candidate.effects, effect)
         if self.nothing_held_out:
             return self.assess(effects, fitted)
