@@ -55,7 +55,7 @@ def _light(candidate: FittedHypothesis) -> FittedHypothesis:
     """A hypothesis without residuals, its likelihood worked out."""
     known = dict(candidate.likelihood())
     fit = replace(candidate.fit, residuals={})
-    return replace(candidate, fit=fit, scattered=float, likelihood=partial(dict, known))
+    return replace(candidate, fit=fit, likelihood=partial(dict, known))
 
 
 @contextmanager

@@ -20,19 +20,19 @@ ROOT = Path(__file__).parents[2]
 
 #: Statements that a package of pamrs may have; ``.`` are the modules beside the packages.
 PACKAGES = {
-    ".": 1109,
+    ".": 1112,
     "campaigns": 1151,
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11149,
+    "diagnosis": 11143,
     "effects": 404,
     "experiments": 1078,
-    "findings": 959,
+    "findings": 958,
     "fit": 2936,
     "library": 71,
     "recordings": 5019,
-    "report": 1947,
+    "report": 1946,
     "rig": 2227,
     "rigs": 141,
     "simulation": 1095,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27948,
+    "tests": 27979,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1235,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37311
+MOST = 37306
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

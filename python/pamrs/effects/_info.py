@@ -51,8 +51,7 @@ class EffectParameter:
         Values that are tried one by one, evenly in their logarithm, before any is fitted: a
         resonance has to be met.
     same_everywhere : bool
-        Whether an effect's size is the same in all recordings, so that its scatter between them
-        speaks against the effect.
+        Whether it is the same in all recordings, whatever else is not.
     time_constant : bool
         Whether recordings must last as long as it, or so, to tell it.
     own : bool

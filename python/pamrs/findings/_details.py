@@ -292,8 +292,6 @@ class Tried(Entry):
         What it leaves of each block's variance, in units of the noise's.
     gap_closed : float
         Share of the baseline's excess that it takes on held-out recordings.
-    scatter : float
-        Relative scatter of its size between recordings.
     fitted_values, std : dict of str to float
         Parameters of its effects, SI (key ``values``), and their standard deviations.
     prior : float
@@ -310,7 +308,6 @@ class Tried(Entry):
     fitted: dict[str, float]
     held_out: dict[str, float]
     gap_closed: float
-    scatter: float
     fitted_values: dict[str, float] = field(metadata={"key": "values"})
     std: dict[str, float]
     prior: float

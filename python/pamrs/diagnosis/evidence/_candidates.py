@@ -38,9 +38,6 @@ class FittedHypothesis:
         By block, on the recordings to fit.
     gap_closed : float
         Share of the baseline's excess that it removes on held-out recordings.
-    scattered : callable
-        Relative scatter of its size between recordings, beyond its uncertainty, which takes
-        simulations.
     gain : float
         Gain in chi-square that the screen predicted for a single effect.
     wrong : tuple of str
@@ -57,7 +54,6 @@ class FittedHypothesis:
     held_out_excess: dict[str, Excess]
     fit_excess: dict[str, Excess]
     gap_closed: float
-    scattered: Callable[[], float] = field(default=float, repr=False)
     gain: float = 0.0
     wrong: tuple[str, ...] = ()
     log_places: float = 0.0

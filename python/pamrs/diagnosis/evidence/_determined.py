@@ -15,7 +15,8 @@ from pamrs.effects import Term, effect_of
 _SAME_SHARE = 0.1  # part of an effect's size below which what tells it from another effect is zero
 # standard deviations within which a value, or a difference, is not told from zero
 SAME_STDS = 2.0
-# stated deviations within which a size is not determined; a stated one is twice the pieces'
+# stated deviations within which a size, or that a value is wrong, is not determined; a stated one
+# is twice the pieces'
 _DETERMINED_STDS = 1.0
 
 
@@ -25,7 +26,7 @@ def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
     effect may end lower without the effect's doing.
     """
     fitted = candidate.fit
-    if may_be_inside(candidate, walls):
+    if may_be_inside(candidate, walls, SAME_STDS):
         return True
     if fitted.events is not None:
         return False
@@ -87,18 +88,25 @@ def is_near_none(distance: float, count: int, stds: float) -> bool:
     return bool(chi2.sf(distance, count) >= chi2.sf(stds**2, 1))
 
 
-def may_be_inside(candidate: FittedHypothesis, walls: float) -> bool:
-    """True where the interval of a value called wrong reaches into its tolerances."""
-    return any(value_may_be_inside(candidate.fit, name, walls) for name in candidate.wrong)
+def may_be_inside(
+    candidate: FittedHypothesis, walls: float, stds: float = _DETERMINED_STDS
+) -> bool:
+    """True where a value called wrong may be right."""
+    return any(value_may_be_inside(candidate.fit, name, walls, stds) for name in candidate.wrong)
 
 
-def value_may_be_inside(fitted: Fit, name: str, walls: float) -> bool:
-    """True where a fitted value is inside its tolerances (`walls` of them), or less than two
-    standard deviations outside, which is its interval.
+def value_may_be_inside(
+    fitted: Fit, name: str, walls: float, stds: float = _DETERMINED_STDS
+) -> bool:
+    """True where a fitted value is inside its tolerances (`walls` of them) or less than `stds`
+    standard deviations outside, or where its interval of 95 % holds the value of the file.
     """
+    std = fitted.std.get(name, 0.0)
+    if abs(fitted.values[name] - fitted.known[name].value) < SAME_STDS * std:
+        return True
     wall = moved_value(fitted.known[name], math.copysign(walls, fitted.moved[name]))
     beyond = math.copysign(1.0, fitted.moved[name]) * (fitted.values[name] - wall)
-    return beyond < SAME_STDS * fitted.std.get(name, 0.0)
+    return beyond < stds * std
 
 
 def with_stated_std(

@@ -223,7 +223,6 @@ def _tried_sets(groups: list[BlockGroup]) -> list[Tried]:
             fitted={b: e.ratio for b, e in candidate.fit_excess.items()},
             held_out={b: e.ratio for b, e in candidate.held_out_excess.items()},
             gap_closed=candidate.gap_closed,
-            scatter=candidate.scattered(),
             fitted_values=candidate.fit.effect_values,
             std={
                 n: s

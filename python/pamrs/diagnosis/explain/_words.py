@@ -21,8 +21,6 @@ from pamrs.report.words import format_probability, sized_alike, spoken_block, sp
 from pamrs.rig.schema import split_name
 from pamrs.units import in_words
 
-# relative scatter of an effect's size between recordings from which it is reported
-_SCATTER = 0.35
 # share of the ambient pressure within which a recording that begins at it may be absolute
 _AMBIENT_SHARE = 0.01
 # [Pa] gauge pressure that a channel never exceeds, below which its unit is questioned
@@ -129,7 +127,6 @@ def warnings(
 ) -> list[str]:
     """Warnings about the data and the fit."""
     out = []
-    groups = [j.group for j in judged]
     mistaken = any(j.wrong for j in judged)
     symptoms = {
         name: far
@@ -173,13 +170,6 @@ def warnings(
         out.append(
             f"there is no held-out recording: the proof is on the fitted data and counts less{how}"
         )
-    for group in groups:
-        best = group.best
-        if best.effects and (scatter := best.scattered()) > _SCATTER:
-            out.append(
-                f"the size of {best.hypothesis} scatters by {100 * scatter:.0f} % between "
-                "recordings"
-            )
     for name in unknown_volumes(case.rig):
         out.append(
             f"{name} is marked unknown: values that scale with it hold for the placeholder only"

@@ -12,7 +12,6 @@ import numpy as np
 
 from pamrs.channels import block_of, channel_of
 from pamrs.diagnosis.evidence import (
-    SAME_STDS,
     BlockLikelihood,
     FittedHypothesis,
     Likelihood,
@@ -21,7 +20,6 @@ from pamrs.diagnosis.evidence import (
 )
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
-    FIT_BIN_TIME,
     LEAST_STEP_SHARE,
     Events,
     Fit,
@@ -29,7 +27,6 @@ from pamrs.diagnosis.fit import (
     Key,
     Problem,
     Start,
-    acts_in,
     fit,
     fit_events,
     free_baseline,
@@ -52,7 +49,6 @@ from pamrs.diagnosis.noise import (
     excess,
     inflation_of,
     no_inflation,
-    usual_inflation,
 )
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.search._closure import find_closure
@@ -307,7 +303,6 @@ class Attempts:
             held_out_excess,
             fit_excess,
             gap,
-            scattered=cache(partial(_scatter, effects, self.fit_problem, fitted)),
             log_places=sum(math.log(len(self.terms_of(e.id))) for e in effects),
             likelihood=self.likelihood_of(fitted.residuals, held_out_residuals),
         )
@@ -604,43 +599,3 @@ def _emptier_than_empty(problem: Problem, fitted: Fit) -> bool:
                 if behind < min(0.0, lowest) - _EMPTIER_PART * highest:
                     return True
     return False
-
-
-def _scatter(effects: tuple[Term, ...], problem: Problem, best: Fit) -> float:
-    """Relative scatter of a single effect's size between recordings, beyond its uncertainty.
-
-    One Gauss-Newton step of the effect's leading parameter alone in each recording: a wrong effect
-    needs another size in every regime.
-    """
-    if len(effects) != 1 or len(problem.recordings) < 2:
-        return 0.0
-    info = effects[0].info
-    leading = next((f"{effects[0]}.{p.name}" for p in info.parameters if p.same_everywhere), None)
-    # of a transient effect one size was fitted to all recordings
-    if info.transient or leading is None:
-        return 0.0
-    size = abs(best.values.get(leading, 0.0))
-    if size == 0.0:
-        return 0.0
-    try:
-        with_slopes = residuals(problem, best.rig, [leading])
-    except SimulationError:
-        return 0.0  # nothing is known of it
-    steps, errors = [], []
-    for prepared in problem.recordings:
-        num = den = 0.0
-        for block in problem.blocks:
-            r = with_slopes[block.name, prepared.recording.name]
-            if r.jacobian is None or not acts_in(effects[0], block):
-                continue
-            slope = r.jacobian[:, 0] / r.noise
-            unit = usual_inflation(block, [prepared], with_slopes, FIT_BIN_TIME)
-            num += float(slope @ (r.value / r.noise)) / unit
-            den += float(slope @ slope) / unit
-        if den > 0:
-            steps.append(num / den / size)
-            errors.append(1.0 / math.sqrt(den) / size)
-    if len(steps) < 2:
-        return 0.0
-    beyond = [max(0.0, abs(s) - SAME_STDS * e) for s, e in zip(steps, errors, strict=True)]
-    return float(max(beyond))
