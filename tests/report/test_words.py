@@ -184,7 +184,7 @@ def test_a_miss_inside_the_usual_error_of_a_model_is_said_so() -> None:
     errors = {"joint_angle": dict(zip(KEYS, (0.001, 0.02, 0.01, 0.01), strict=True))}
     fit = {"channels": errors, "held_out": {}, "gap_closed": None}
     for error, told in (
-        (0.012, "to within its usual error (joint angle 0.57 deg of 0.69 deg)"),
+        (0.012, "to within its usual error (joint angle 0.57 deg of up to 1.4 deg)"),
         (0.0046, "to within 10 noise levels (0.57 deg) of joint angle"),
     ):
         quiet = replace(own, mismatch=[replace(mismatch, model_error=error)])

@@ -15,6 +15,7 @@ from pamrs.findings import (
     MENDED,
     MOST_MISSED,
     NOISE_LEVELS,
+    OWN_ERRORS,
     YOURS,
     BlockMismatch,
     BudgetTerm,
@@ -335,14 +336,14 @@ def _healthy_misses(diagnosis: Findings) -> Iterator[tuple[BlockMismatch, str, M
 
 def _within(own: BlockMismatch, found: Miss) -> str:
     """Words for an error that is the usual one of a model."""
-    sizes = f"{found.size} of {sized(own.model_error, own.unit)}"
+    sizes = f"{found.size} of up to {sized(OWN_ERRORS * own.model_error, own.unit)}"
     return f"to within its usual error ({spoken_name(own.channel)} {sizes})"
 
 
 def within_error(diagnosis: Findings) -> list[str]:
     """Groups of which nothing is missing, though they miss much, inside the error of their model,
     where other groups lack something: ``the arm fits to within its usual error (joint angle 1.2 deg
-    of 1.9 deg)``.
+    of up to 3.8 deg)``.
     """
     return [
         f"the {spoken_name(own.block)} fits {_within(own, found)}"
