@@ -74,7 +74,8 @@ class Channel:
     only : tuple of str, optional
         Key of the block and its value, where not every block of the kind has it.
     noise : float
-        Standard deviation of a sample by a usual sensor, SI; 0 where no cut chain uses the channel.
+        Standard deviation of a sample by a usual sensor, SI; 0 of commands, and where no cut chain
+        uses the channel.
     """
 
     name: str

@@ -193,4 +193,4 @@ def test_physics_in_the_held_out_recording_alone_is_searched_there(
     assert [e.id for e in found.effects] == ["joint_end_stop"] * named, found.summary()
     fitted = [d.recording for d in found.data if d.role == "fit"]
     assert fitted == (["a", "c"] if named else ["a", "b"])
-    assert any("roles were exchanged" in warning for warning in found.warnings) is named
+    assert any("a and b" not in w and "c, held out" in w for w in found.warnings) is named

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import pamrs
+from pamrs.diagnosis.laws import _is_an_effect
 from pamrs.rig import other_choices
 from tests.diagnosis.healthy import RIGS, healthy_case
 
@@ -38,6 +39,13 @@ def test_a_valve_that_lets_air_through_one_way_has_no_area_for_both() -> None:
     (sonic,) = other_choices(SHOULDER, ("valve",))
     one_way = sonic.rig.with_parameters({"valve.fill_conductance": 0.0})
     assert list(other_choices(one_way, ("valve",))) == []
+
+
+def test_an_energy_balance_is_an_effect_and_no_other_law_is() -> None:
+    rigs: list[pamrs.Rig] = [getattr(pamrs.rigs, name)() for name in RIGS]
+    every = {(c.name, c.other): _is_an_effect(c) for rig in rigs for c in other_choices(rig)}
+    assert len(every) > 5
+    assert {law for law, own in every.items() if own} == {("chamber.gas", "energy_balance")}
 
 
 @pytest.mark.parametrize(

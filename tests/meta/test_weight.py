@@ -25,14 +25,14 @@ PACKAGES = {
     "cli": 1424,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11143,
+    "diagnosis": 11141,
     "effects": 404,
     "experiments": 1078,
-    "findings": 958,
+    "findings": 961,
     "fit": 2936,
     "library": 71,
     "recordings": 5019,
-    "report": 1946,
+    "report": 1947,
     "rig": 2227,
     "rigs": 141,
     "simulation": 1095,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 27979,
+    "tests": 28012,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1235,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37306
+MOST = 37308
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

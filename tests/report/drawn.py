@@ -76,7 +76,7 @@ def findings(draw: st.DrawFn) -> Diagnosis:
         before, after = refit * draw(st.floats(0.9, 5.0)), refit * draw(st.floats(0.02, 1.1))
         sizes = (before, refit, max(0.9, after))
         table[channel] = ChannelError(noise, *(noise * size for size in sizes))
-        own[channel] = draw(st.sampled_from([0.0, 0.3, 3.0, 20.0])) * noise
+        own[channel] = draw(st.sampled_from([0.0, 0.3, 0.9, 3.0, 20.0])) * noise
     groups = [group(block, draw(chances(block))) for block in blocks]
     judged = judge(groups, SETTINGS)
     missing = [_conclude._missed(j, table, own) for j in judged]
@@ -109,7 +109,7 @@ def _under_another_law(found: Diagnosis) -> Diagnosis:
     channel, error = next(iter(found.proven.items()))
     unit = next(unit for name, unit, _ in CHANNELS.values() if name == channel)
     sizes = (2.0 * error.refit, error.refit, error.noise)
-    law = OtherLaw("chamber.gas", "isothermal", "energy_balance", channel, unit, *sizes)
+    law = OtherLaw("chamber.gas", "energy_balance", "coefficients", channel, unit, *sizes)
     text = f"{law_sentence(law)}. With it: {found.text}"
     return _assemble.answered(replace(found, laws=[law], text=text))
 

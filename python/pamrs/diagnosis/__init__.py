@@ -63,6 +63,7 @@ from pamrs.effects import CATALOGUE, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
 from pamrs.findings import MOST_MISSED, Answer, Limit, MissingInput, NextExperiment, beyond
 from pamrs.recordings import Case, is_table, load_case
+from pamrs.report.words import listed
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig, supplies_of
 
@@ -217,13 +218,18 @@ def diagnose(
     began = time.perf_counter()
     say = Steps(progress, within=_JUDGED)
     say("reading the case", 0.0)
-    case = _case_of(case, data, rig, allow_outside=allow_outside)
+    stated = _case_of(case, data, rig, allow_outside=allow_outside)
     chosen = DiagnosisSettings() if settings is None else settings
-    checked = check_case(case, chosen)
+    checked = check_case(stated, chosen)
     case = checked.case
     considered = _checked_suspicions(case.rig, consider)
     with _in_range(case.name):
         diagnosis, checked = _answer_without_unfollowed(checked, chosen, considered, say)
+        if _is_shown_by_held_out_alone(stated, diagnosis):
+            with suppress(PamrsError):  # the first answer stays
+                other = _answer_with_other_roles(stated, chosen, considered)
+                if other[0].answer.named and not other[0].answer.missed:
+                    diagnosis, checked = other
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     say(f"{case.name}: done", 1.0)
@@ -233,6 +239,39 @@ def diagnose(
         inputs=dict(case.inputs),
         seconds=round(time.perf_counter() - began, 3),
     )
+
+
+def _is_shown_by_held_out_alone(case: Case, diagnosis: Diagnosis) -> bool:
+    """True where a block without a name misses more than noise in held-out recordings, and no more
+    in the fitted ones, which have nothing to search by then.
+    """
+    missed = {m.block for m in diagnosis.answer.missed}
+    return bool(case.fit and case.held_out) and any(
+        m.held_out is not None
+        and m.held_out.refit.more_than_noise
+        and not m.fitted.refit.more_than_noise
+        for group in diagnosis.judged
+        if not (group.effects or group.wrong_parameters)
+        for m in group.mismatch
+        if m.block in missed
+    )
+
+
+def _answer_with_other_roles(
+    case: Case, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...]
+) -> tuple[Diagnosis, DiagnosableCase]:
+    """Diagnosis with all recordings fitted but the last of those that were; with the checked case.
+    That one proves that a name does no harm where it does not act.
+    """
+    proof, held = case.fit[-1].name, listed([r.name for r in case.held_out])
+    recordings = [
+        replace(r, role="held_out" if r.name == proof else "fit") for r in case.recordings
+    ]
+    checked = check_case(replace(case, recordings=recordings), settings)
+    silent = Steps(None, within=_JUDGED)
+    found, checked = _answer_without_unfollowed(checked, settings, considered, silent)
+    note = f"what {held}, held out, shows is not in the others: fitted with them, {proof} held out"
+    return replace(found, warnings=[note, *found.warnings]), checked
 
 
 def _answer_without_unfollowed(
@@ -289,11 +328,6 @@ def _diagnosis_of_checked_case(
             what, lambda: _under_best_law(case, considered, fit_problem, stated), stated
         )
         fit_problem = judged
-        exchanged = _with_exchanged_roles(checked, diagnosis)
-        if exchanged is not None:
-            other = _diagnosis_of_checked_case(exchanged, settings, considered, say)
-            if other.answer.named and not other.answer.missed:
-                return other
     # the first few are all that a terminal shows: first what may make the answer wrong
     # a unit that is found settles what was doubted under the one that was said
     doubts = checked.doubts if misread is None else []
@@ -314,28 +348,6 @@ def _diagnosis_of_checked_case(
     ]
     data = data_used(recordings, counts, fit_problem.blocks, case.rig, fit_problem.core, unjudged)
     return replace(diagnosis, warnings=warnings, data=data)
-
-
-_EXCHANGED = "held-out recordings show what the fitted ones do not: roles were exchanged"
-"""Note on a case whose recordings have other roles than were stated."""
-
-
-def _with_exchanged_roles(checked: DiagnosableCase, diagnosis: Diagnosis) -> DiagnosableCase | None:
-    """The case with its held-out recordings to be fitted and the last of the others held out, where
-    a block misses more than noise in held-out ones alone: the fitted ones have nothing to search
-    by; None elsewhere.
-    """
-    answer = diagnosis.answer
-    missed = [m.block for m in answer.missed if m.block]
-    mismatches = [m for b in diagnosis.judged for m in b.mismatch if m.block in missed]
-    shown = any(m.fitted.refit.more_than_noise for m in mismatches)
-    if not mismatches or shown or answer.named or _EXCHANGED in checked.notes:
-        return None
-    proof = checked.case.fit[-1].name
-    roles = {r.name: "held_out" if r.name == proof else "fit" for r in checked.case.recordings}
-    recordings = [replace(r, role=roles[r.name]) for r in checked.case.recordings]
-    case = replace(checked.case, recordings=recordings)
-    return replace(checked, case=case, notes=[*checked.notes, _EXCHANGED])
 
 
 def _case_of(case: Any, data: Any, rig: Any, *, allow_outside: bool) -> Case:

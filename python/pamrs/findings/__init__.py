@@ -7,9 +7,9 @@ thing, once: the answer that all of it comes to (`Answer`).
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
 `WrongParameter`, `Unexplained`, ...), `MissingInput` with `MissingRecording`, and the `shown_unit`
 of what it has; `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
-`Answer` with its `Part` and `Missed`, and what decides it (`case_verdict`, `beyond`, `left_of`,
-`chance_of`, `SETTLED`); `compare_results` of two results, and `Compared`; `to_plain`, by which they
-become JSON, and `fields_from`, which reads it.
+`Answer` with its `Part` and `Missed`, and what decides it (`case_verdict`, `beyond`, `explained`,
+`left_of`, `chance_of`, `SETTLED`); `compare_results` of two results, and `Compared`; `to_plain`, by
+which they become JSON, and `fields_from`, which reads it.
 """
 
 from pamrs.findings._answer import (
@@ -17,7 +17,6 @@ from pamrs.findings._answer import (
     MENDED,
     MOST_MISSED,
     NOISE_LEVELS,
-    OWN_ERRORS,
     REFITTED,
     SETTLED,
     YOURS,
@@ -27,6 +26,7 @@ from pamrs.findings._answer import (
     beyond,
     case_verdict,
     chance_of,
+    explained,
     left_of,
 )
 from pamrs.findings._compare import Compared, compare_results
@@ -83,7 +83,6 @@ __all__ = [
     "MOST_MISSED",
     "NOISE_LEVELS",
     "NOT_JUDGED",
-    "OWN_ERRORS",
     "REFITTED",
     "SETTLED",
     "TOLD_APART",
@@ -135,6 +134,7 @@ __all__ = [
     "beyond",
     "case_verdict",
     "chance_of",
+    "explained",
     "compare_results",
     "fields_from",
     "left_of",

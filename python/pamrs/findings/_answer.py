@@ -24,7 +24,7 @@ SETTLED: Final = 0.75
 """Probability above which an answer is settled, if nothing else is left open."""
 MOST_MISSED: Final = 5.0
 """[noise levels] Error beyond noise and the model's own above which nothing is settled."""
-OWN_ERRORS: Final = 2.0
+_OWN_ERRORS: Final = 2.0
 """[standard deviations] Error of a model that is still its own: its square is that of a few numbers
 (docs/decisions/0095)."""
 FORM_ERROR: Final = 0.1
@@ -55,7 +55,14 @@ def beyond(size: float, noise: float, error: float) -> float:
     """
     if not (math.isfinite(size) and noise > 0.0):
         return 0.0
-    return size / noise - math.hypot(1.0, OWN_ERRORS * error / noise)
+    return (size - explained(noise, error)) / noise
+
+
+def explained(noise: float, error: float) -> float:
+    """Largest error of a channel that its noise and the error of its model explain, in the unit of
+    both standard deviations.
+    """
+    return math.hypot(noise, _OWN_ERRORS * error)
 
 
 def case_verdict(verdicts: Iterable[str], *, missed: bool = False) -> str:

@@ -195,6 +195,15 @@ def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
     assert attempts.fit_events(Term("payload_change"), wrong) is None
 
 
+def test_events_pay_for_no_more_numbers_than_there_are_independent_samples() -> None:
+    pushes = {name: dict.fromkeys("abcdefghij", 1.0) for name in ("one", "two")}
+    events = Events(Term("external_torque"), pushes)
+    pushed, prior = hypothesis({}, 0.1, events=events), Prior(0.985, 40.0, SETTINGS)
+    each = SETTINGS.parameter_price
+    assert prior.price(pushed) - prior.price(pushed, 8.0) == pytest.approx(12.0 * each)
+    assert prior.price(pushed, 80.0) == prior.price(pushed)
+
+
 def with_wrong(found: FittedHypothesis, *names: str) -> FittedHypothesis:
     """The same beside values that are 7 tolerances below those of the rig file."""
     values, moved = dict.fromkeys(names, 0.72), dict.fromkeys(names, -7.0)

@@ -301,30 +301,43 @@ def test_a_size_is_as_uncertain_as_its_shape_and_yet_determined(
 
 
 @pytest.mark.parametrize(
-    ("off", "std", "kept"), [(5.0, 0.5, 0.9), (5.0, 2.4, 0.0), (18.0, 8.0, 0.9), (18.0, 9.5, 0.0)]
+    ("off", "std", "kept"), [(5.0, 0.5, 1.0), (5.0, 2.4, 0.0), (18.0, 8.0, 1.0), (18.0, 9.5, 0.0)]
 )
 def test_a_wrong_value_that_is_not_determined_is_no_name_in_noise(
     monkeypatch: pytest.MonkeyPatch, off: float, std: float, kept: float
 ) -> None:
-    """Less than one standard deviation beyond the third tolerance, or two off the file's value."""
+    """Less than one standard deviation beyond the third tolerance, or two off the file's value:
+    alone and with a leak it is put aside, and what remains keeps its odds.
+    """
     name = "chamber.dead_volume"
     problem, own = leak_group(3e-9)
-    base = own.candidates[0]
+    base, leak = own.candidates[:2]
     tolerance = base.fit.scales[name]
     far = base.fit.known[name].value + off * tolerance
-    moved = replace(
-        base.fit, moved=base.fit.moved | {name: off}, values=base.fit.values | {name: far}
-    )
     monkeypatch.setattr(
         "pamrs.diagnosis.evidence._determined.spread_over_pieces",
-        lambda problem, found: {name: std * tolerance},
+        lambda problem, found: dict.fromkeys(found.values, 1e-12) | {name: std * tolerance},
     )
-    wrong = replace(base, fit=moved, wrong=(name,))
-    chances = {wrong.hypothesis: 0.9, UNDECIDED: 0.1}
-    near = replace(own, candidates=[base, wrong], probabilities=chances, mismatch=None)
+    wrong, pair = (
+        replace(
+            one,
+            fit=replace(
+                one.fit,
+                moved=one.fit.moved | {name: off},
+                values=one.fit.values | {name: far},
+            ),
+            wrong=(name,),
+        )
+        for one in (base, leak)
+    )
+    chances = {wrong.hypothesis: 0.6, pair.hypothesis: 0.2, leak.hypothesis: 0.15, UNDECIDED: 0.05}
+    every = [base, wrong, pair, leak]
+    near = replace(own, candidates=every, probabilities=chances, mismatch=None)
     left = drop_undetermined(near, problem).probabilities
-    assert left.get(wrong.hypothesis, 0.0) == pytest.approx(kept)
-    assert left[UNDECIDED] == pytest.approx(1.0 - kept)
+    assert left.get(wrong.hypothesis, 0.0) == pytest.approx(kept * 0.6)
+    assert left.get(pair.hypothesis, 0.0) == pytest.approx(kept * 0.2)
+    assert left[leak.hypothesis] == pytest.approx(3.0 * left[UNDECIDED])
+    assert sum(left.values()) == pytest.approx(1.0)
 
 
 def test_events_of_another_effect_determine_no_value() -> None:

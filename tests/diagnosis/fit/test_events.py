@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.fit import Events, residuals
+from pamrs.diagnosis.fit import Events, fit, fit_events, refit_events, residuals
 from pamrs.diagnosis.fit._vibration import lines_of
 from pamrs.diagnosis.prepare import Residual
 from pamrs.effects import Term
@@ -73,6 +74,25 @@ def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -
     for name, when in TIMES.items():
         assert abs(times[name] - when) < 0.25, name
     assert found.fit["gap_closed"] > 0.8
+
+
+def test_events_are_fitted_on_where_their_recordings_count_less() -> None:
+    """A heavier payload is taken back to the file's as the recordings lose their weight."""
+    payload = RIG.parameter("arm.payload")
+    heavier = RIG.with_parameters({payload.name: payload.value + 2.0 * payload.tol})
+    push = {"torque": 3.0, "duration": 0.8}
+    problem = problem_of(RIG, recordings("external_torque", push, 9.0, plant=heavier))
+    problem = replace(problem, blocks=[b for b in problem.blocks if b.name == "arm"])
+    white, light = {"arm": 1.0}, {"arm": 1e6}
+    baseline = fit(problem, RIG, (), {}, white)
+    found = fit_events(Term("external_torque"), problem, RIG, baseline, white)
+    assert found is not None
+    again = refit_events(found, problem, RIG, baseline, light)
+    assert (found.inflation, again.inflation) == (white, light)
+    assert found.moved[payload.name] > 1.5
+    assert abs(again.moved[payload.name]) < 0.5 * found.moved[payload.name]
+    assert again.events is not None
+    assert again.events.values.keys() == found.events.values.keys() == TIMES.keys()
 
 
 @pytest.mark.slow

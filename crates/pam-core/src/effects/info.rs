@@ -72,8 +72,7 @@ pub struct EffectParameter {
     /// Least, greatest and number of values that are tried one by one, evenly in their logarithm,
     /// before any is fitted: a resonance has to be met.
     pub scan: Option<(f64, f64, u32)>,
-    /// The effect's size is the same in all recordings, so that its scatter between them speaks
-    /// against the effect.
+    /// It is the same in all recordings, whatever else is not.
     pub same_everywhere: bool,
     /// Recordings must last as long as it, or so, to tell it.
     pub time_constant: bool,

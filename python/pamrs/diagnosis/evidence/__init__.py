@@ -8,7 +8,7 @@ where the geometry of a joint is marked unknown (`diagnosis/__init__`). Public: 
 `probability_cap`, `loss_of_file`, `is_unlikely`, `parameters_at_wall` (odds); `posterior`,
 `posterior_where_noise`, `log_weight`, `possible_gain`, `drop_undetermined`, `put_aside`,
 `are_alike` (probabilities); `explains`, `share_left`, `significant`, `misses_only_held_out` (what
-hypotheses leave); `is_absent`, `same_recordings`, `value_may_be_inside`, `with_stated_std` (sizes
+hypotheses leave); `is_absent`, `same_recordings`, `value_may_be_right`, `with_stated_std` (sizes
 that are determined); `Judged`, `judge`, `case_probabilities`, `case_ambiguity` (verdicts).
 """
 
@@ -27,7 +27,7 @@ from pamrs.diagnosis.evidence._determined import (
     SAME_STDS,
     is_absent,
     same_recordings,
-    value_may_be_inside,
+    value_may_be_right,
     with_stated_std,
 )
 from pamrs.diagnosis.evidence._likelihood import BlockLikelihood, Likelihood
@@ -88,7 +88,7 @@ __all__ = [
     "significant",
     "with_stated_std",
     "parameters_at_wall",
-    "value_may_be_inside",
+    "value_may_be_right",
     "posterior",
     "posterior_where_noise",
 ]

@@ -21,12 +21,12 @@ _DETERMINED_STDS = 1.0
 
 
 def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
-    """True where a wrong value may be inside its tolerances (`walls` of them), or all sizes of an
+    """True where a wrong value may be right (`walls` of its tolerances), or all sizes of an
     effect together may be zero, within two standard deviations. A fit that goes on with such an
     effect may end lower without the effect's doing.
     """
     fitted = candidate.fit
-    if may_be_inside(candidate, walls, SAME_STDS):
+    if may_be_right(candidate, walls, SAME_STDS):
         return True
     if fitted.events is not None:
         return False
@@ -88,14 +88,12 @@ def is_near_none(distance: float, count: int, stds: float) -> bool:
     return bool(chi2.sf(distance, count) >= chi2.sf(stds**2, 1))
 
 
-def may_be_inside(
-    candidate: FittedHypothesis, walls: float, stds: float = _DETERMINED_STDS
-) -> bool:
-    """True where a value called wrong may be right."""
-    return any(value_may_be_inside(candidate.fit, name, walls, stds) for name in candidate.wrong)
+def may_be_right(candidate: FittedHypothesis, walls: float, stds: float = _DETERMINED_STDS) -> bool:
+    """True where a value called wrong may be right, as :func:`value_may_be_right` has it."""
+    return any(value_may_be_right(candidate.fit, name, walls, stds) for name in candidate.wrong)
 
 
-def value_may_be_inside(
+def value_may_be_right(
     fitted: Fit, name: str, walls: float, stds: float = _DETERMINED_STDS
 ) -> bool:
     """True where a fitted value is inside its tolerances (`walls` of them) or less than `stds`

@@ -18,7 +18,7 @@ from pamrs.diagnosis.evidence._candidates import BlockGroup, FittedHypothesis, s
 from pamrs.diagnosis.evidence._determined import (
     has_undetermined_effect,
     is_absent,
-    may_be_inside,
+    may_be_right,
     with_stated_std,
 )
 from pamrs.diagnosis.evidence._prior import (
@@ -147,7 +147,7 @@ def log_weight(
     in some blocks, less its price, its moved parameters and its rare values.
     """
     evidence = _evidence(candidate, baseline, compared, tempering) - _strain(candidate)
-    samples = tempering * sum(candidate.likelihood()[block.name].count for block in compared)
+    samples = tempering * sum(baseline.likelihood()[block.name].count for block in compared)
     return evidence - prior.loss(candidate, samples)
 
 
@@ -226,29 +226,31 @@ def _plausibility(candidate: FittedHypothesis) -> float:
 
 def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     """Halve the probability of a single effect whose size is within one standard deviation of zero,
-    or of a single wrong value that may be inside its tolerances.
+    or of a single wrong value that may be right.
 
     The rest goes to ``unlisted``: something acts there, but not surely that. Where only noise was
-    left it goes to `UNDECIDED`, and a wrong value that may be inside is put aside. A set needs no
-    such step: the evidence of the set without the name decides.
+    left it goes to `UNDECIDED`, and sets with a wrong value that may be right are put aside. Other
+    sets need no such step: the evidence of the set without the name decides.
 
     Returns
     -------
     BlockGroup
         With other probabilities; the same where every single name is determined.
     """
-    settings = problem.settings
+    settings, to = problem.settings, _nameless_answer(group)
+    for candidate in group.candidates if to == UNDECIDED else []:
+        if candidate.wrong and may_be_right(
+            with_stated_std(problem, group, candidate), settings.most_tolerances
+        ):
+            group = put_aside(group, candidate.hypothesis)
     probabilities = dict(group.probabilities)
-    to = _nameless_answer(group)
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
         if len(candidate.terms) != 1 or chance < settings.in_set:
             continue
         with_std = with_stated_std(problem, group, candidate)
-        inside = may_be_inside(with_std, settings.most_tolerances)
-        if inside and to == UNDECIDED:
-            return drop_undetermined(put_aside(group, candidate.hypothesis), problem)
-        if inside or has_undetermined_effect(with_std):
+        right = may_be_right(with_std, settings.most_tolerances)
+        if right or has_undetermined_effect(with_std):
             probabilities[candidate.hypothesis] -= 0.5 * chance
             probabilities[to] = probabilities.get(to, 0.0) + 0.5 * chance
     return replace(group, probabilities=probabilities)

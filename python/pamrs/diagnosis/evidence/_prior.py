@@ -76,7 +76,9 @@ class Prior:
     settings: DiagnosisSettings
 
     def loss(self, candidate: FittedHypothesis, samples: float = math.inf) -> float:
-        """Log odds that a hypothesis loses before any data: its price, and rare values."""
+        """Log odds that a hypothesis loses before any data: its price by so many independent
+        samples, and rare values.
+        """
         return self.price(candidate, samples) + self.rarity(candidate)
 
     def price(self, candidate: FittedHypothesis, samples: float = math.inf) -> float:

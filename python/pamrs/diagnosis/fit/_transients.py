@@ -152,8 +152,10 @@ def refit_events(
     ----------
     fitted : Fit
         With events.
-    problem, nominal, baseline, inflation
-        As in :func:`fit_events`.
+    problem, nominal, baseline
+        Blocks and recordings, the nominal model, and its fit without events.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fit.fit`.
     """
     assert fitted.events is not None
     values = baseline.values | {name: fitted.values[name] for name in baseline.moved}
@@ -516,6 +518,7 @@ def _fit_jointly(
         | {f"{events.effect}.{p}": s for p, s in event_std.items()},
         cost=0.5 * float(values @ values),
         residuals=by_block,
+        inflation=inflation,
         moved={n: float(v) for n, v in zip(names, x[:count], strict=True)},
         evaluations=spent,
         events=found,

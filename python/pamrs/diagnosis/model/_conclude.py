@@ -22,7 +22,7 @@ from pamrs.diagnosis.evidence import (
     drop_undetermined,
     judge,
     put_aside,
-    value_may_be_inside,
+    value_may_be_right,
     with_stated_std,
 )
 from pamrs.diagnosis.fit import (
@@ -277,7 +277,7 @@ def _needless(models: Models, settings: DiagnosisSettings) -> set[int]:
         k
         for k, judged in enumerate(models.judged)
         for name in judged.wrong
-        if value_may_be_inside(
+        if value_may_be_right(
             models.chosen[models.owners[name]].fit, name, settings.most_tolerances
         )
     }

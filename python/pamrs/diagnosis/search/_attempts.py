@@ -178,11 +178,10 @@ class Attempts:
         fitted = fit_events(effect, self.fit_problem, model, candidate.fit, no_inflation)
         if fitted is None:
             return None
-        inflation = self.inflation_of(fitted)
         if candidate.effects:
             fitted = self._fit_in_turn(fitted, candidate, no_inflation)
-        elif inflation.largest > CORRELATED_VARIANCE:
-            fitted = refit_events(fitted, self.fit_problem, model, candidate.fit, inflation)
+        elif (left := self.inflation_of(fitted)).largest > CORRELATED_VARIANCE:
+            fitted = refit_events(fitted, self.fit_problem, model, candidate.fit, left)
         effects = (*candidate.effects, effect)
         if self.nothing_held_out:
             return self.assess(effects, fitted)

@@ -15,7 +15,6 @@ from pamrs.findings import (
     MENDED,
     MOST_MISSED,
     NOISE_LEVELS,
-    OWN_ERRORS,
     YOURS,
     BlockMismatch,
     BudgetTerm,
@@ -31,6 +30,7 @@ from pamrs.findings import (
     PairExperiment,
     Unexplained,
     WrongParameter,
+    explained,
     left_of,
 )
 from pamrs.report.words import (
@@ -334,9 +334,10 @@ def _healthy_misses(diagnosis: Findings) -> Iterator[tuple[BlockMismatch, str, M
             yield own, left, found
 
 
-def _within(own: BlockMismatch, found: Miss) -> str:
+def _within(diagnosis: Findings, own: BlockMismatch, found: Miss) -> str:
     """Words for an error that is the usual one of a model."""
-    sizes = f"{found.size} of up to {sized(OWN_ERRORS * own.model_error, own.unit)}"
+    most = explained(diagnosis.proven[own.channel].noise, own.model_error)
+    sizes = f"{found.size} of up to {sized(most, own.unit)}"
     return f"to within its usual error ({spoken_name(own.channel)} {sizes})"
 
 
@@ -346,7 +347,7 @@ def within_error(diagnosis: Findings) -> list[str]:
     of up to 3.8 deg)``.
     """
     return [
-        f"the {spoken_name(own.block)} fits {_within(own, found)}"
+        f"the {spoken_name(own.block)} fits {_within(diagnosis, own, found)}"
         for own, left, found in _healthy_misses(diagnosis)
         if diagnosis.answer.parts and left == "error" and found.noises > MOST_MISSED
     ]
@@ -362,7 +363,7 @@ def down_to(diagnosis: Findings) -> str:
     own, left, found = max(missed, key=lambda entry: entry[2].noises)
     if left == "more":
         return f"to within {found} of {spoken_name(own.channel)}"
-    return _within(own, found)
+    return _within(diagnosis, own, found)
 
 
 def not_judged_words(diagnosis: Findings) -> list[str]:
