@@ -226,10 +226,8 @@ def diagnose(
     with _in_range(case.name):
         diagnosis, checked = _answer_without_unfollowed(checked, chosen, considered, say)
         if _is_shown_by_held_out_alone(stated, diagnosis):
-            with suppress(PamrsError):  # the first answer stays
-                other = _answer_with_other_roles(stated, chosen, considered)
-                if other[0].answer.named and not other[0].answer.missed:
-                    diagnosis, checked = other
+            other = _answer_with_other_roles(stated, chosen, considered)
+            diagnosis, checked = other or (diagnosis, checked)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     say(f"{case.name}: done", 1.0)
@@ -259,19 +257,24 @@ def _is_shown_by_held_out_alone(case: Case, diagnosis: Diagnosis) -> bool:
 
 def _answer_with_other_roles(
     case: Case, settings: DiagnosisSettings, considered: tuple[Hypothesis, ...]
-) -> tuple[Diagnosis, DiagnosableCase]:
-    """Diagnosis with all recordings fitted but the last of those that were; with the checked case.
-    That one proves that a name does no harm where it does not act.
+) -> tuple[Diagnosis, DiagnosableCase] | None:
+    """Diagnosis with all recordings fitted but the last of those that were, with the checked case;
+    None where it fails, names nothing or misses more. That recording proves that a name does no
+    harm where it does not act.
     """
     proof, held = case.fit[-1].name, listed([r.name for r in case.held_out])
     recordings = [
         replace(r, role="held_out" if r.name == proof else "fit") for r in case.recordings
     ]
-    checked = check_case(replace(case, recordings=recordings), settings)
-    silent = Steps(None, within=_JUDGED)
-    found, checked = _answer_without_unfollowed(checked, settings, considered, silent)
     note = f"what {held}, held out, shows is not in the others: fitted with them, {proof} held out"
-    return replace(found, warnings=[note, *found.warnings]), checked
+    with suppress(PamrsError):
+        checked = check_case(replace(case, recordings=recordings), settings)
+        found, checked = _answer_without_unfollowed(
+            checked, settings, considered, Steps(None, within=_JUDGED)
+        )
+        if found.answer.named and not found.answer.missed:
+            return replace(found, warnings=[note, *found.warnings]), checked
+    return None
 
 
 def _answer_without_unfollowed(

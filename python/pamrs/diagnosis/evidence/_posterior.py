@@ -246,11 +246,11 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     probabilities = dict(group.probabilities)
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
-        if len(candidate.terms) != 1 or chance < settings.in_set:
+        was_asked = candidate.wrong and to == UNDECIDED
+        if was_asked or len(candidate.terms) != 1 or chance < settings.in_set:
             continue
         with_std = with_stated_std(problem, group, candidate)
-        right = may_be_right(with_std, settings.most_tolerances)
-        if right or has_undetermined_effect(with_std):
+        if may_be_right(with_std, settings.most_tolerances) or has_undetermined_effect(with_std):
             probabilities[candidate.hypothesis] -= 0.5 * chance
             probabilities[to] = probabilities.get(to, 0.0) + 0.5 * chance
     return replace(group, probabilities=probabilities)
