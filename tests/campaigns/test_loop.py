@@ -46,7 +46,10 @@ class Found:
     def __init__(self, rig, settled=False, probability=0.5, ask=None, limits=()):
         self.rig, self.verdict, self.limits = rig, "effects", list(limits)
         self.answer = SimpleNamespace(
-            settled=settled, names=("leak_muscle",), probability=probability, why="sets"
+            settled=settled,
+            names=("leak_muscle",),
+            probability=probability,
+            why="" if settled else "sets",
         )
         self.wrong_parameters = []
         self.ambiguity = [] if settled else [["leak_muscle"], ["supply_leak"]]
@@ -193,9 +196,10 @@ def test_where_nothing_is_missing_what_was_not_seen_is_asked_for(rig, pool, diag
     diagnosed.plan.limits.append(
         SimpleNamespace(effect="valve_hysteresis", verdict="named", recording="fast_triangle")
     )
-    blind, healthy = Found(rig, settled=True, limits=[hidden]), Found(rig, settled=True)
+    blind, healthy = Found(rig, limits=[hidden]), Found(rig, settled=True)
     for one in (blind, healthy):
         one.verdict, one.answer.names = "none", ("none",)
+    blind.answer.why = "unseen"
     diagnosed.answers += [blind, healthy]
     before = log(rig, tmp_path, pool)
     found = campaign(SimulatedBench(rig), rig, before * 2, out=tmp_path, bench=FAST, budget=LIMITS)

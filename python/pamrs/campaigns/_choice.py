@@ -25,7 +25,7 @@ from pamrs.diagnosis.next_experiment import (
 from pamrs.effects import NONE, UNLISTED
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.experiments import Experiment, experiments_of, library
-from pamrs.findings import HEALTHY, NextExperiment
+from pamrs.findings import NextExperiment
 from pamrs.recordings import Recording
 from pamrs.report.words import hypothesis_label, listed, spoken_name
 from pamrs.rig import Rig
@@ -171,11 +171,6 @@ def unseen(diagnosis: Diagnosis) -> list[str]:
     return [own.effect for own in diagnosis.limits if own.verdict == "not seen"]
 
 
-def is_healthy(diagnosis: Diagnosis) -> bool:
-    """True where nothing is missing, and no value is wrong, by a diagnosis."""
-    return diagnosis.verdict in HEALTHY and not diagnosis.wrong_parameters
-
-
 def is_open(diagnosis: Diagnosis | None, recordings: int) -> str:
     """Open question of a diagnosis of so many recordings, in words; empty where there is none."""
     if diagnosis is None:
@@ -185,13 +180,6 @@ def is_open(diagnosis: Diagnosis | None, recordings: int) -> str:
     if recordings < 2:
         return "the answer rests on one recording, and has not predicted another one yet"
     return ""
-
-
-def not_shown(effects: Iterable[str]) -> str:
-    """Effects that recordings would not show, in words; empty where there are none."""
-    return (
-        f"these recordings would not show {_effects(effects)} at the usual size" if effects else ""
-    )
 
 
 def proposed(
@@ -217,7 +205,8 @@ def proposed(
             return found
     if not any(label == str(NONE) for label, _, _ in rivals):
         rivals.append((str(NONE), rig, 0.0 if rivals else 1.0))  # what the rig file says
-    if own.protocol is not None and own.protocol.name in allowed:
+    unseen = diagnosis is not None and diagnosis.answer.why == "unseen" and not repeat
+    if own.protocol is not None and own.protocol.name in allowed and not unseen:
         return ProposedRun(allowed[own.protocol.name], own.text, repeat, rivals)
     if repeat:
         name = next(iter(allowed), "")
@@ -297,10 +286,10 @@ def _showing(
     shown = _shown_by(best, blind)
     if shown:
         why = f"It would show {_effects(shown)} at the usual size."
-        if diagnosis is not None and not is_healthy(diagnosis) and diagnosis.answer.settled:
+        if diagnosis is not None and diagnosis.answer.settled:
             why = f"An answer from one recording has to predict another one. {why}"
         return ProposedRun(best, why, False, rivals)
-    if diagnosis is not None and diagnosis.answer.settled:
+    if diagnosis is not None and diagnosis.answer.why in ("", "unseen"):
         return None
     why = "The answer is not settled: another motion may tell more."
     if diagnosis is None:

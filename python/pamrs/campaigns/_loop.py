@@ -15,9 +15,7 @@ from pamrs.campaigns._budget import Budget, Cost
 from pamrs.campaigns._choice import (
     Pool,
     asked_for,
-    is_healthy,
     is_open,
-    not_shown,
     plan_of,
     pool_of,
     proposed,
@@ -219,12 +217,12 @@ class _Work:
     @property
     def wanted(self) -> dict[str, list[str]]:
         """Effects that are to be seen, each with the experiments that show it: every one before an
-        answer has predicted a recording, those not seen yet behind an answer by which nothing is
-        missing, else none.
+        answer has predicted a recording, those not seen yet where these leave it open, else none.
         """
         found, proven = self.found, len(self.before) + len(self.folder.played) > 1
-        open_ = found is not None and not found.answer.settled and found.answer.why != "name"
-        if open_ or (found is not None and proven and not is_healthy(found)):
+        hidden = found is not None and found.answer.why == "unseen"
+        settled = found is None or found.answer.why in ("", "name")
+        if not hidden and (proven or not settled):
             return {}
         if self.folder.shows is None:
             self.say("what experiments would show")
@@ -286,15 +284,14 @@ class _Work:
         recordings, spent = self.recordings, self.folder.spent
         if self.found is None:
             self.diagnose()
-        what = is_open(self.found, len(recordings)) or not_shown(self.wanted)
+        what = is_open(self.found, len(recordings))
         headline = "" if self.found is None else self.found.headline
         if not what:
             return self.end("decided", f"Decided: {headline}")
         over = self.budget.passed(spent + Cost(runs=1))
         if over:
             return self.end("budget", f"The budget allows no further run ({over}); open is: {what}")
-        wanted = self.wanted
-        pool = self.pool
+        pool, wanted = self.pool, self.wanted
         last = [step for step in self.folder.steps if step.finished][-_UNCHANGED:]
         stuck = len(last) == _UNCHANGED and not any(step.changed for step in last)
         proposal = None

@@ -4,7 +4,6 @@ sensors that have noise.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -12,13 +11,10 @@ import numpy as np
 
 from pamrs.channels import channel_of
 from pamrs.control.simulated_device import SimulatedDevice, VirtualClock
-from pamrs.diagnosis.next_experiment import measurable
+from pamrs.diagnosis.next_experiment import noise_of
 from pamrs.rig import Rig
 
-#: Noise of usual sensors by kind of channel [SI].
-NOISE: Final = {"joint_angle": math.radians(0.02), "length": 3e-5, "force": 1.0}
-_PRESSURE: Final = 400.0  # [Pa] noise of a gauge of 14 bar
-_UNHEARD: Final = ("valve_command", "supply_command", "temperature", "line_pressure")
+_UNHEARD: Final = ("temperature", "line_pressure")  # a usual bench has no sensors of these
 
 
 class SimulatedBench:
@@ -42,11 +38,8 @@ class SimulatedBench:
         self, rig: Rig, *, noise: Mapping[str, float] | None = None, seed: int = 0, **device: Any
     ) -> None:
         self.rig, self.clock, self._device = rig, VirtualClock(), device
-        given, self._random = {**NOISE, **(noise or {})}, np.random.default_rng(seed)
-        kinds = {name: channel_of(name) for name in measurable(rig)}
-        self._noise = {
-            name: given.get(kind, _PRESSURE) for name, kind in kinds.items() if kind not in _UNHEARD
-        }
+        self._random, every = np.random.default_rng(seed), noise_of(rig, noise)
+        self._noise = {n: std for n, std in every.items() if channel_of(n) not in _UNHEARD}
         self.prepare()
 
     def prepare(self) -> None:

@@ -10,7 +10,6 @@ imported inside the command that needs it, so that ``pamrs --help`` answers at o
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated, Final
@@ -21,7 +20,6 @@ from pamrs.cli._shared import with_quiet
 from pamrs.cli._streams import guarded
 from pamrs.cli.campaign import campaign_command
 from pamrs.cli.compare import compare_command
-from pamrs.cli.completion import VARIABLE, completion_command
 from pamrs.cli.design import design_app
 from pamrs.cli.diagnose import diagnose_command
 from pamrs.cli.effects import effects_command
@@ -53,13 +51,11 @@ app = typer.Typer(
         "Exit codes: 0 done; 1 interrupted; 2 wrong input, nothing done; 4 done, but a file or the "
         "text could not be written."
     ),
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
 _GROUPS: Final = {"rig": rig_app, "fit": fit_app, "design": design_app}
 _COMMANDS: Final[dict[str, Callable[..., None]]] = {
-    "completion": completion_command,
     "simulate": simulate_command,
     "effects": effects_command,
     "example": example_command,
@@ -148,10 +144,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(words: list[str]) -> int:
     """Run a command, or say to a shell how it may go on; the exit code."""
     command = typer.main.get_command(app)
-    if VARIABLE in os.environ:
-        from typer._completion_classes import completion_init
-
-        completion_init()
     try:
         code = command.main(args=words, prog_name="pamrs", standalone_mode=False)
         if code == _TYPER_INTERRUPTED:

@@ -25,13 +25,13 @@ from typing import Any
 
 from pamrs._progress import Steps
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.evidence import BlockGroup
+from pamrs.diagnosis.evidence import BlockGroup, odds_of_unseen
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, Unfollowed, fits, free_baseline, with_offsets
 from pamrs.diagnosis.laws import is_better, promising_laws, under
-from pamrs.diagnosis.limits import limits_of
+from pamrs.diagnosis.limits import Limits, limits_of
 from pamrs.diagnosis.missing import missing_input_of, worst_block
-from pamrs.diagnosis.model import Conclusion, conclude
+from pamrs.diagnosis.model import Conclusion, conclude, refitted_rig
 from pamrs.diagnosis.next_experiment import next_to_record
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
@@ -61,7 +61,7 @@ from pamrs.diagnosis.search import examine, find_misread, reading_errors
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
-from pamrs.findings import MOST_MISSED, Answer, Limit, MissingInput, NextExperiment, beyond
+from pamrs.findings import MOST_MISSED, Answer, MissingInput, NextExperiment, beyond
 from pamrs.recordings import Case, is_table, load_case
 from pamrs.report.words import listed
 from pamrs.rig import Rig, load_rig
@@ -401,8 +401,21 @@ def _diagnosis_in_units_said(
     say("putting the answer together", _JUDGED[1])
     judged_names, failed = {block.name for block in fit_problem.blocks}, "its judgement failed"
     unjudged += [Unjudged(b.name, b.covers, failed) for b in every if b.name not in judged_names]
+    limits = fit_problem.losses.part(
+        "the limits", lambda: _limits(case.rig, groups, fit_problem, held_out_problem)
+    )
+    if limits is not None:
+        unseen = odds_of_unseen(limits.acting(), fit_problem.settings)
+        groups = [replace(g, unseen=sum(unseen.get(b.name, 0.0) for b in g.blocks)) for g in groups]
     conclusion = conclude(case.rig, fit_problem, held_out_problem, groups)
     diagnosis = assemble(case, fit_problem, held_out_problem, groups, conclusion, unjudged)
+    if limits is not None:
+        beyond_noise = {
+            b.name: beyond(error.after, error.noise, conclusion.own_errors[b.channel])
+            for b in fit_problem.blocks
+            if (error := conclusion.table.get(b.channel))
+        }
+        diagnosis = replace(diagnosis, limits=limits.acting(beyond_noise))
     proposal = fit_problem.losses.part(
         "the next experiment",
         lambda: next_to_record(
@@ -425,14 +438,10 @@ def _diagnosis_in_units_said(
         first = missing.times[0].recording
         spans = [[t.start, t.stop] for t in missing.times if t.recording == first]
         where = replace(where, recording=first, intervals=sorted(spans))
-    limits = fit_problem.losses.part(
-        "the limits", lambda: _limits(conclusion, fit_problem, held_out_problem), []
-    )
     diagnosis = replace(
         diagnosis,
         where=where,
         missing_input=missing,
-        limits=limits,
         next_experiment=proposal,
         warnings=[*slack, *diagnosis.warnings],
     )
@@ -488,17 +497,15 @@ def _missing(
     return missing.thinned(400) if missing is not None and followed else None
 
 
-def _limits(conclusion: Conclusion, fit_problem: Problem, held_out_problem: Problem) -> list[Limit]:
-    """Sizes from which the recordings would have shown effects, and distinguished them."""
-    every, baseline = _all_recordings(fit_problem, held_out_problem), conclusion.models.baseline
-    beyond_noise = {
-        b.name: beyond(error.after, error.noise, conclusion.own_errors[b.channel])
-        for b in fit_problem.blocks
-        if (error := conclusion.table.get(b.channel))
-    }
-    return limits_of(
-        every, baseline, list(free_baseline(every, baseline)), conclusion.noise_level, beyond_noise
-    )
+def _limits(
+    nominal: Rig, groups: list[BlockGroup], fit_problem: Problem, held_out_problem: Problem
+) -> Limits:
+    """Sizes from which all recordings would have shown effects, and distinguished them, next to the
+    values of the refits.
+    """
+    every, baseline = _all_recordings(fit_problem, held_out_problem), refitted_rig(nominal, groups)
+    noise_level = {key: level for group in groups for key, level in group.noise_level.items()}
+    return limits_of(every, baseline, free_baseline(every, baseline), noise_level)
 
 
 def _all_recordings(fit_problem: Problem, held_out_problem: Problem) -> Problem:

@@ -42,7 +42,14 @@ from pamrs.findings import DETECTED, TOLD_APART, Limit
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-__all__ = ["Limits", "Products", "counted", "limits_of", "possible_starts", "products_of"]
+__all__ = [
+    "Limits",
+    "Products",
+    "counted",
+    "limits_of",
+    "possible_starts",
+    "products_of",
+]
 
 _MOST_MULTIPLE = 1e4  # [typical sizes] largest size of an effect that is worth telling
 # halvings of a size until a rig can have it: below a hundredth it is another effect
@@ -97,7 +104,6 @@ def products_of(
     starts: Sequence[Start],
     baseline: Sequence[str],
     noise_level: Mapping[Key, NoiseLevel],
-    unexplained: Mapping[str, float] | None = None,
 ) -> Products:
     """Products of what some recordings show of effects, baseline parameters and the model's error.
 
@@ -113,8 +119,6 @@ def products_of(
         Parameters that may move inside their tolerances.
     noise_level : dict
         By block and recording, with the curves of the model's error.
-    unexplained : dict of str to float, optional
-        What a diagnosis leaves unexplained by block [noise levels]; more than one counts as noise.
 
     Raises
     ------
@@ -138,8 +142,8 @@ def products_of(
             )
             means, counts = binned(free * tolerances, base_residual.rows, bins_of(prepared))
             curves = np.empty((means.shape[0], 0)) if level.curves is None else level.curves
-            noise = level.binned_noise * max(1.0, (unexplained or {}).get(block.name, 1.0))
             share = counted(prepared, block, problem.settings) / max(1, int((counts > 0).sum()))
+            noise = level.binned_noise
             weights[place] = math.sqrt(share) / noise if noise > 0.0 else 0.0
             columns[place] = [curves, means, np.zeros((means.shape[0], len(starts)))]
     for k, start in enumerate(starts):
@@ -222,6 +226,8 @@ class Limits:
         baseline: Sequence[str],
         settings: DiagnosisSettings,
     ) -> None:
+        self._products = products
+        self._given = starts, baseline, settings
         names = [str(s.effect) for s in starts]
         k, count = len(baseline), len(starts)
         self.each = {name: Limit(name) for name in names}
@@ -255,6 +261,18 @@ class Limits:
         chosen = [self._best[name] for name in self.each]
         information = np.eye(len(chosen)) + free[np.ix_(chosen, chosen)]
         self.bits = 0.5 * float(np.linalg.slogdet(information)[1]) / math.log(2.0)
+
+    def acting(self, unexplained: Mapping[str, float] | None = None) -> list[Limit]:
+        """Limits of the effects that act in a block; more than one noise level that a diagnosis
+        leaves unexplained of a block counts as noise.
+        """
+        left = {name: max(1.0, size) for name, size in (unexplained or {}).items()}
+        scaled = {
+            (block, recording): values / left.get(block.name, 1.0) ** 2
+            for (block, recording), values in self._products.items()
+        }
+        each = Limits(scaled, *self._given).each if left else self.each
+        return [limit for limit in each.values() if limit.block]
 
     def _taken(self, name: str, rivals: Mask) -> Array:
         """Part of an effect's squared signature that each rival column takes at its best size."""
@@ -328,17 +346,13 @@ def _sized(start: Start, size: float) -> float:
 
 
 def limits_of(
-    problem: Problem,
-    rig: Rig,
-    baseline: Sequence[str],
-    noise_level: Mapping[Key, NoiseLevel],
-    unexplained: Mapping[str, float],
-) -> list[Limit]:
+    problem: Problem, rig: Rig, baseline: Sequence[str], noise_level: Mapping[Key, NoiseLevel]
+) -> Limits:
     """Limits of every effect that a rig can have, by recordings that are there.
 
     Parameters
     ----------
-    problem, rig, baseline, noise_level, unexplained
+    problem, rig, baseline, noise_level
         As of :func:`products_of`.
 
     Raises
@@ -347,6 +361,5 @@ def limits_of(
         If the model leaves the range in which it holds.
     """
     starts = possible_starts(rig, problem.blocks)
-    products = products_of(problem, rig, starts, baseline, noise_level, unexplained)
-    limits = Limits(products, starts, baseline, problem.settings).each.values()
-    return [limit for limit in limits if limit.block]
+    products = products_of(problem, rig, starts, baseline, noise_level)
+    return Limits(products, starts, baseline, problem.settings)

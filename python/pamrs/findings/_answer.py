@@ -164,14 +164,15 @@ class Answer(Entry):
     why : str
         Why it is not: ``missed`` (the final model still misses too much), ``sets`` (the recordings
         cannot tell several answers apart), ``probability`` (below that from which an answer is
-        settled), ``name`` (what is missing has none), ``units`` (channels are read wrong); empty
-        where it is.
+        settled), ``name`` (what is missing has none), ``unseen`` (nothing is seen, and the
+        recordings would hardly show what may act), ``units`` (channels are read wrong); empty where
+        it is.
     block : str or None
         Where the mismatch of what leads is; None where nothing is missing.
     names : list of str
         What leads: names, or ``none``, ``parameters``, ``unlisted``.
     probability : float
-        Of what leads, in its group of blocks.
+        Of what leads, in its group of blocks; where nothing is missing, that of all groups.
     missed : list of Missed
         What the final model still misses, the largest first.
     model : str
@@ -257,8 +258,13 @@ def answer_of(
     sure = all(p.sure for p in parts)
     # that something acts which has no name decides nothing about what it is
     nameless = any(p.words == ("unlisted",) for p in parts)
+    unseen = False
+    if not (parts or missed or other_law):
+        chance = math.prod(p.probability for p in quiet)
+        unseen = chance <= enough
     why = "missed" if missed else "sets" if open_ else "name" if sure else "probability"
-    settled = not missed and sure and not nameless
+    why = "unseen" if unseen else why
+    settled = not missed and sure and not nameless and not unseen
     verdicts = [*(p.group.verdict for p in every), *["parameters"] * other_law]
     return Answer(
         verdict=case_verdict(verdicts, missed=bool(missed)),
@@ -289,7 +295,8 @@ def _part(group: BlockVerdict, places: Mapping[str, str | None], enough: float) 
     for other in group.ambiguity if len(group.ambiguity) > 1 else []:
         same = set(other) == set(leading) or (other[0] in HEALTHY and leading[0] in HEALTHY)
         open_answers += [] if same else [(tuple(other), chance_of(chances, other))]
-    sure = len(open_answers) == 1 and not chance <= enough
+    # effects that recordings would hardly show are a question about all groups together
+    sure = len(open_answers) == 1 and not chance <= enough * (1.0 - group.unseen)
     return Part(group, _block(group, places), tuple(open_answers), together, sure)
 
 

@@ -216,6 +216,9 @@ class BlockVerdict(Entry):
         Why it is not judged; empty where it is.
     block : str or None
         Which of its blocks has the mismatch, or the value that is wrong; None where nothing is.
+    unseen : float
+        Part of the probability of ``unlisted``: that nothing is seen, and an effect acts that the
+        recordings would hardly show at its usual sizes (``limits``).
     """
 
     blocks: list[str]
@@ -228,6 +231,7 @@ class BlockVerdict(Entry):
     covers: str = ""
     reason: str = ""
     block: str | None = None
+    unseen: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

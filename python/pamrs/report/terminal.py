@@ -13,7 +13,6 @@ from pamrs.report.words import (
     error_cells,
     format_probability,
     format_uncertain,
-    hypothesis_label,
     plain,
 )
 from pamrs.units import with_unit
@@ -68,7 +67,7 @@ def _probabilities(diagnosis: Findings) -> list[str]:
     lines = []
     for part, chances in sentences.bars(diagnosis):
         ranked = sentences.ranked_probabilities(chances, 5)
-        rows = [(hypothesis_label(name), p) for name, p in ranked]
+        rows = [(sentences.explanation_label(part, name), p) for name, p in ranked]
         width = min(max([38, *(len(name) for name, _ in rows)]), 56)
         heads = [f"{blocks_label(part.group)}:"] if part and len(diagnosis.judged) > 1 else []
         lines += ["", *heads] if rows else []
@@ -108,12 +107,14 @@ def _fit(diagnosis: Findings) -> list[str]:
 
 def notebook(diagnosis: Findings) -> str:
     """Short HTML for notebooks."""
+    part, chances = sentences.bars(diagnosis)[0]
     rows = "".join(
-        f"<tr><td style='text-align:left'>{html.escape(hypothesis_label(name))}</td>"
+        f"<tr><td style='text-align:left'>{html.escape(sentences.explanation_label(part, name))}"
+        "</td>"
         f"<td>{html.escape(format_probability(p))}</td>"
         f"<td style='text-align:left'><span style='display:inline-block;height:.7em;"
         f"width:{max(0.0, min(1.0, p)) * 12:.2f}em;background:#0072b2'></span></td></tr>"
-        for name, p in sentences.ranked_probabilities(sentences.bars(diagnosis)[0][1], 5)
+        for name, p in sentences.ranked_probabilities(chances, 5)
     )
     mended = html.escape(sentences.mended_sentence(diagnosis, "With what was found"))
     return (

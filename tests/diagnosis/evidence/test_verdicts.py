@@ -250,7 +250,8 @@ def test_less_than_half_a_noise_level_is_no_physics_without_a_name(
     own = group("chamber", {"unlisted": 1.0}, shifted=True)
     size = {"chamber": Excess(3.0, left, 0.0, 1.0, 1.0, 1.1)}
     base = replace(own.candidates[0], fit_excess=size, held_out_excess=size)
-    (found,) = judge([replace(own, candidates=[base])], SETTINGS)
+    (found,) = judge([replace(own, candidates=[base], unseen=0.25)], SETTINGS)
     assert found.verdict == verdict
     chance = found.probabilities[Hypothesis((), "unlisted")]
-    assert chance == pytest.approx(1.0 if verdict == "unlisted" else 0.14)
+    assert chance == pytest.approx(1.0 if verdict == "unlisted" else 0.2)
+    assert found.unseen == pytest.approx(0.0 if verdict == "unlisted" else 0.2)

@@ -5,11 +5,12 @@ times prior, for hypotheses of one group of blocks and of all groups, in the ord
 It changes once more where `model` takes an answer out that its errors contradict (`put_aside`), and
 where the geometry of a joint is marked unknown (`diagnosis/__init__`). Public: `FittedHypothesis`,
 `BlockGroup` (hypotheses); `BlockLikelihood`, `Likelihood` (how probable recordings are); `Prior`,
-`probability_cap`, `loss_of_file`, `is_unlikely`, `parameters_at_wall` (odds); `posterior`,
-`posterior_where_noise`, `log_weight`, `possible_gain`, `drop_undetermined`, `put_aside`,
-`are_alike` (probabilities); `explains`, `share_left`, `significant`, `misses_only_held_out` (what
-hypotheses leave); `is_absent`, `same_recordings`, `value_may_be_right`, `with_stated_std` (sizes
-that are determined); `Judged`, `judge`, `case_probabilities`, `case_ambiguity` (verdicts).
+`probability_cap`, `loss_of_file`, `odds_of_unseen`, `is_unlikely`, `parameters_at_wall` (odds);
+`posterior`, `posterior_where_noise`, `log_weight`, `possible_gain`, `drop_undetermined`,
+`put_aside`, `are_alike` (probabilities); `explains`, `share_left`, `significant`,
+`misses_only_held_out` (what hypotheses leave); `is_absent`, `same_recordings`,
+`value_may_be_right`, `with_stated_std` (sizes that are determined); `Judged`, `judge`,
+`case_probabilities`, `case_ambiguity` (verdicts).
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ from pamrs.diagnosis.evidence._prior import (
     Prior,
     is_unlikely,
     loss_of_file,
+    odds_of_unseen,
     parameters_at_wall,
     probability_cap,
 )
@@ -79,6 +81,7 @@ __all__ = [
     "is_unlikely",
     "judge",
     "loss_of_file",
+    "odds_of_unseen",
     "log_weight",
     "put_aside",
     "probability_cap",

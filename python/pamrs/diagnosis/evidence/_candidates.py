@@ -115,6 +115,9 @@ class BlockGroup:
         Whether one was looked for.
     predicted_gain : dict of Term to float
         Share of the mismatch that each tested effect could take by its signature alone.
+    unseen : float
+        Odds, against none, that an effect acts here which the recordings would hardly show; even
+        where no limits are known.
     """
 
     blocks: list[Block]
@@ -128,6 +131,7 @@ class BlockGroup:
     closure: FittedHypothesis | None = None
     sought: bool = False
     predicted_gain: dict[Term, float] = field(default_factory=dict)
+    unseen: float = 1.0
 
     @property
     def best(self) -> FittedHypothesis:

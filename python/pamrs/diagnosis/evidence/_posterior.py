@@ -286,6 +286,7 @@ def _probabilities_alone(group: BlockGroup) -> dict[Hypothesis, float]:
     )
     only_noise = group.mismatch is None and not has_wrong_value
     shares = shares_of_undecided(
+        group.unseen,
         unlikely=only_noise and is_unlikely(group.candidates[0].fit),
         nominal_misses=any(significant(e) for e in group.nominal.values()),
     )

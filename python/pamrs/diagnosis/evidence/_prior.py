@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from pamrs.diagnosis.evidence._candidates import FittedHypothesis
 from pamrs.diagnosis.evidence._determined import SAME_STDS
@@ -26,6 +27,7 @@ from pamrs.effects import (
     find_parameter,
     usual_values,
 )
+from pamrs.findings import DETECTED, Limit
 
 UNLISTED_PRICE = 6.0  # [log odds] price of physics without a name (decision 14)
 # odds of a name whose right fit was not found, or has no equation here, to physics without a name:
@@ -41,14 +43,9 @@ _UNSEEN_PRICE = 6.5
 _MOST_RANGE_PRICE = 4.0
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
 SHARED_ODDS = 6.0
-# share of `UNDECIDED` (decision 4) that goes to none where parameters moved, and to parameters
-# where they did not; the likelier of both gets what remains
-_NOISE_ONLY_OTHER = 0.03
-# share of unlisted: in 24 of 171 such groups physics was missing that was too small to be seen
-_NOISE_ONLY_UNLISTED = 0.14
 # share of parameters where their values are unlikely, of unlisted what remains: they explain all,
-# at a price the owner would mind
-_UNLIKELY_PARAMETERS = 0.75
+# at a price the owner would mind, and settle nothing
+_UNLIKELY_PARAMETERS = 0.7
 # [tolerances] moved to its wall (the setting most_tolerances), which is suspect (decision 25)
 WALL_TOLERANCES = 2.9
 # [noise levels] left in a group below which nothing has no name: both such groups of 40 read cases
@@ -124,15 +121,34 @@ def loss_of_file(candidate: FittedHypothesis, settings: DiagnosisSettings) -> fl
     return sum(odds + candidate.beyond_walls_by(name, walls) for name in candidate.wrong)
 
 
-def shares_of_undecided(*, unlikely: bool, nominal_misses: bool) -> Mapping[Hypothesis, float]:
-    """Answers among which the probability of `UNDECIDED` is divided, each with its share: by
-    whether the values of the baseline are unlikely, and whether the nominal model misses.
+def odds_of_unseen(limits: Iterable[Limit], settings: DiagnosisSettings) -> dict[str, float]:
+    """Odds, against none, that an effect acts which recordings would hardly show, by the block that
+    shows it best: of each effect at the price of a name with one size, shared by its places, the
+    share of its usual sizes (log-normal) that stays below what is detected.
     """
+    every = list(limits)
+    odds = dict.fromkeys((limit.block for limit in every), 0.0)
+    places = Counter(Term.parse(limit.effect).id for limit in every)
+    price = settings.name_price + settings.parameter_price
+    for limit in every:
+        below = math.log(DETECTED / max(limit.seen, 1e-300)) / SIZE_SPREAD
+        share = float(norm.cdf(below)) / places[Term.parse(limit.effect).id]
+        odds[limit.block] += share * math.exp(-price)
+    return odds
+
+
+def shares_of_undecided(
+    unseen: float, *, unlikely: bool, nominal_misses: bool
+) -> Mapping[Hypothesis, float]:
+    """Answers among which the probability of `UNDECIDED` is divided, each with its share: by the
+    odds of effects that are not seen, whether the values of the baseline are unlikely, and whether
+    the nominal model misses.
+    """
+    rest = 1.0 / (1.0 + unseen)
     if unlikely:
-        return {PARAMETERS: _UNLIKELY_PARAMETERS, UNLISTED: 1.0 - _UNLIKELY_PARAMETERS}
-    most = 1.0 - _NOISE_ONLY_OTHER - _NOISE_ONLY_UNLISTED
-    moved, none = (most, _NOISE_ONLY_OTHER) if nominal_misses else (_NOISE_ONLY_OTHER, most)
-    return {PARAMETERS: moved, NONE: none, UNLISTED: _NOISE_ONLY_UNLISTED}
+        known = _UNLIKELY_PARAMETERS * rest
+        return {PARAMETERS: known, UNLISTED: 1.0 - known}
+    return {PARAMETERS if nominal_misses else NONE: rest, UNLISTED: 1.0 - rest}
 
 
 def probability_cap(fitted: Problem, mismatch: Block, rms_left: float, *, alone: bool) -> float:

@@ -43,6 +43,8 @@ class Judged:
         Those that are left open; empty when settled.
     chosen : FittedHypothesis
         The hypothesis that is named; the baseline where none is.
+    unseen : float
+        Probability that nothing is seen and an effect acts that the recordings would hardly show.
     """
 
     group: BlockGroup
@@ -50,6 +52,7 @@ class Judged:
     probabilities: dict[Hypothesis, float]
     ambiguity: list[Hypothesis]
     chosen: FittedHypothesis
+    unseen: float = 0.0
 
     @property
     def named(self) -> tuple[Term, ...]:
@@ -110,16 +113,19 @@ def _with_verdict(
     group: BlockGroup, probabilities: dict[Hypothesis, float], settings: DiagnosisSettings
 ) -> Judged:
     """A group with the verdict of its likeliest hypothesis; unlisted only if no name exceeds
-    ``named``.
+    ``named``. What the recordings would hardly show is no answer by itself.
     """
     start = group.candidates[0]
+    nothing = sum(probabilities.get(h, 0.0) for h in _HEALTHY_HYPOTHESES)
+    unseen = min(probabilities.get(UNLISTED, 0.0), nothing * group.unseen)
+    shown = probabilities | {UNLISTED: probabilities.get(UNLISTED, 0.0) - unseen}
     named = {h: p for h, p in probabilities.items() if h not in WITHOUT_NAME}
     healthy = max(_HEALTHY_HYPOTHESES, key=lambda h: probabilities.get(h, 0.0))
-    without = probabilities.get(UNLISTED, 0.0)
+    without = shown[UNLISTED]
     best = max(named, key=lambda h: named[h], default=UNDECIDED)
-    ambiguity = _left_open(probabilities, settings)
+    ambiguity = _left_open(normalised(shown), settings)
     if probabilities.get(healthy, 0.0) >= max(without, named.get(best, 0.0)):
-        return Judged(group, healthy.rest, probabilities, ambiguity, start)
+        return Judged(group, healthy.rest, probabilities, ambiguity, start, unseen)
     marginal = [sum(p for h, p in named.items() if term in h.terms) for term in terms_of(named)]
     if named.get(best, 0.0) <= without and max(marginal, default=0.0) <= settings.named:
         return Judged(group, UNLISTED.rest, probabilities, ambiguity, start)

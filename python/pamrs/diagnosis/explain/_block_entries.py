@@ -72,6 +72,7 @@ def block_entries(
             ambiguity=[hypothesis.words for hypothesis in j.ambiguity],
             mismatch=[mismatch(b) for b in j.group.blocks],
             block=_located(j),
+            unseen=j.unseen,
         )
         for j in judged
     ]

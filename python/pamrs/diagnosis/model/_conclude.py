@@ -223,6 +223,11 @@ def conclude(
     )
 
 
+def refitted_rig(nominal: Rig, groups: list[BlockGroup]) -> Rig:
+    """The rig with the values that the refit of each group of blocks has."""
+    return _merged_rig(nominal, [group.candidates[0] for group in groups])
+
+
 def _own_errors(problem: Problem, noise_level: dict[Key, NoiseLevel]) -> dict[str, float]:
     """Standard deviation of each channel by the error that is taken for the model's own [SI]."""
     names = [p.recording.name for p in problem.recordings]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -34,7 +35,7 @@ from pamrs.experiments import (
     joined,
     protocol_of,
 )
-from pamrs.findings import Answer, Findings, NextExperiment, PairExperiment, Part
+from pamrs.findings import Answer, Findings, Limit, NextExperiment, PairExperiment, Part
 from pamrs.report.sentences import left_in
 from pamrs.report.words import capital, hypothesis_label, spoken_name
 from pamrs.rig import Rig
@@ -283,6 +284,8 @@ def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
         settled = "are settled" if what == "names" else "is settled"
         text = f"The {what} {settled} by these recordings; no further one is needed."
         return NextExperiment(text, {}, 0.0)
+    if answer.why == "unseen":
+        return _of_unseen(asked, diagnosis.limits)
     if part is None:
         return _of_whole(asked, diagnosis)
     left = [Hypothesis.of(own) for own, _ in part.left]
@@ -296,6 +299,16 @@ def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
     sure = not answer.missed and all(own.sure for own in answer.parts)
     begin = "The name is settled. " if answer.named and sure else ""
     return asked.answer(f"{begin}For the {spoken_name(block.name)}", block, terms)
+
+
+def _of_unseen(asked: _Question, limits: Iterable[Limit]) -> NextExperiment:
+    """Next experiment where nothing is seen to be missing: about the block in which most effects of
+    usual size would hardly be seen.
+    """
+    hidden = Counter(limit.block for limit in limits if limit.verdict == "not seen")
+    block = max(asked.blocks, key=lambda b: hidden[b.name])
+    begin = "Most of what these recordings would hardly show acts there"
+    return asked.answer(f"{begin}. For the {spoken_name(block.name)}", block)
 
 
 def _of_whole(asked: _Question, diagnosis: Findings) -> NextExperiment:

@@ -223,11 +223,13 @@ def healthy_sentence(diagnosis: Findings) -> str:
     held = " and ".join(f"the {label(i)}" for i in dict.fromkeys(ids) if i in EFFECTS)
     where = f" in the {judged}" * bool(judged)
     where += f" in addition to {held} that the model holds" * bool(held)
-    how = down_to(diagnosis)
+    how, unseen = down_to(diagnosis), diagnosis.answer.why == "unseen"
+    where += " that these recordings would show" * unseen
     if diagnosis.answer.verdict == "parameters":
         by = "values inside their tolerances explain the difference"
         return f"No physics is missing{where}: {by}" + f" {how}" * (how != DOWN_TO_NOISE)
-    return f"Nothing is missing{where}: the model explains these recordings {how}"
+    what = "them" if unseen else "these recordings"
+    return f"Nothing is missing{where}: the model explains {what} {how}"
 
 
 def _phrase(diagnosis: Findings, part: Part, most: int) -> str:
@@ -334,11 +336,30 @@ def unsettled_sentence(diagnosis: Findings) -> str:
         if len(part.left) == 1 and not part.sure
     ]
     reasons += [
+        f"effects that these recordings would hardly show at their usual sizes have a probability "
+        f"of {format_probability(1.0 - answer.probability)}{_listed_unseen(diagnosis)}"
+    ] * (answer.why == "unseen")
+    reasons += [
         f"what is missing in the {place(part)} has no name"
         for part in answer.parts
         if part.sure and part.words == ("unlisted",)
     ]
     return f"It is not settled: {'; '.join(reasons)}." if reasons else ""
+
+
+def _listed_unseen(diagnosis: Findings) -> str:
+    """Effects below their limits, in parentheses; empty where none is wholly below."""
+    names = [label(own.effect) for own in diagnosis.limits if own.verdict == "not seen"]
+    return f" ({listed(names, most=4)})" if names else ""
+
+
+def explanation_label(part: Part | None, key: str) -> str:
+    """Readable name of a hypothesis of a group of blocks: what has no name is not seen where
+    nothing is missing.
+    """
+    if part is not None and key == UNLISTED.rest and part.group.unseen > 0.0:
+        return "effect that is not seen here"
+    return hypothesis_label(key)
 
 
 def told_apart(part: Part) -> str:
@@ -371,7 +392,9 @@ def _answer(names: list[str], chance: float = math.nan) -> str:
 def left_sentences(diagnosis: Findings) -> list[str]:
     """Answers that the recordings cannot separate, a sentence for each group of blocks."""
     several = (part.left for part in diagnosis.answer.parts if len(part.left) > 1)
-    return ["; ".join(answer_label(own) for own, _ in left) + "." for left in several]
+    left = ["; ".join(answer_label(own) for own, _ in answers) + "." for answers in several]
+    hidden = f"{answer_label([NONE.rest])}; effects below their limits{_listed_unseen(diagnosis)}."
+    return [*left, *[hidden] * (diagnosis.answer.why == "unseen")]
 
 
 def facts(diagnosis: Findings) -> list[tuple[str, str]]:
@@ -528,7 +551,7 @@ def _ranked(
         shown += [(row.id, 0.0) for row in closest[: max(0, most - len(shown))]]
     return [
         Rival(
-            hypothesis_label(key),
+            explanation_label(part, key),
             format_probability(p),
             max(0.0, min(1.0, p)),
             is_named(part, key),
@@ -561,6 +584,8 @@ def _why(diagnosis: Findings, part: Part | None, key: str) -> str:
     """Reason why an explanation has its probability."""
     hypothesis = Hypothesis.parse(key)
     if hypothesis == UNLISTED:
+        if part is not None and part.group.unseen > 0.0:
+            return "of some effects usual sizes leave less than noise and error here (limits)"
         return "a cause without a name is never ruled out"
     channel = (_channel(part) if part else None) or diagnosis.where.channel
     stage = {NONE: "before", PARAMETERS: "refit"}.get(hypothesis, "")
