@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.noise import no_inflation
-from pamrs.diagnosis.prepare import Unjudged
+from pamrs.diagnosis.prepare import AS_LARGE, CLEARLY_LESS, Unjudged
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import refitted
 from pamrs.effects import EFFECTS
@@ -18,10 +18,6 @@ from pamrs.errors import PamrsError
 from pamrs.findings import BlockMismatch, ChannelError, FreeRun, OtherLaw, Trace
 from pamrs.report.sentences import law_sentence
 from pamrs.rig import OtherChoice, Rig, other_choices
-
-_BETTER = 0.5  # share of a squared error that another law leaves, from which it is looked at
-_NO_WORSE = 1.1  # ratio of two errors that count as equal
-
 
 Divided = tuple[Problem, Problem, list[Unjudged]]
 """Recordings to fit, held-out ones, and blocks that are not judged."""
@@ -59,7 +55,7 @@ def promising_laws(
                 missed = _missed(choice.rig, divided[0], names)
             except PamrsError:
                 continue  # a rig that these recordings cannot be of
-            if missed < _BETTER * stated:
+            if missed < CLEARLY_LESS * stated:
                 yield choice, divided
 
 
@@ -91,7 +87,7 @@ def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
     now, before = (_noises(d.proven, channels) for d in (other, stated))
     # a block whose values lie where they hardly can is as much in question as one with a name
     open_to, was = (max(len(d.answer.named), len(d.answer.parts)) for d in (other, stated))
-    return now**2 < _BETTER * before**2 or (open_to < was and now < _NO_WORSE * before)
+    return now**2 < CLEARLY_LESS * before**2 or (open_to < was and now < AS_LARGE * before)
 
 
 def _mismatches(diagnosis: Diagnosis) -> list[BlockMismatch]:

@@ -17,7 +17,7 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import BlockGroup, Judged
 from pamrs.diagnosis.fit import Problem
-from pamrs.diagnosis.next_experiment import _choice, measurable, propose
+from pamrs.diagnosis.next_experiment import measurable, propose
 from pamrs.diagnosis.next_experiment._asked import _measured, _pair, _Question, _telling
 from pamrs.diagnosis.next_experiment._choice import entropy, outcome_of
 from pamrs.diagnosis.next_experiment._differences import (
@@ -250,13 +250,12 @@ def test_every_block_has_its_own_experiment(
 @pytest.mark.parametrize(
     "wrong", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["effect", "parameter"]
 )
-def test_every_open_pair_has_an_experiment(wrong: bool, monkeypatch) -> None:
-    monkeypatch.setattr(_choice, "_LEAST_PROBABILITY", 5e-4)
+def test_every_open_pair_has_an_experiment(wrong: bool) -> None:
     volume = SHOULDER.parameter("chamber.dead_volume")
     truth = (
         SHOULDER.with_parameters({volume.name: volume.value + 6.0 * volume.tol})
         if wrong
-        else SHOULDER.with_effect("leak_muscle", {"conductance": 1e-10})
+        else SHOULDER.with_effect("leak_muscle", {"conductance": 5e-11})
     )
     given = again.case(truth, SHOULDER)
     found = pamrs.diagnose(replace(given, recordings=given.recordings[:2]), settings=OPEN)

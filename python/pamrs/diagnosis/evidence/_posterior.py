@@ -46,7 +46,9 @@ _LEAST_ERROR = 0.1
 _STRAIN_SHARE = 0.5  # share of the priors' sum of squares that counts (decision 14)
 # share of the larger by which values differ however well known, as models err: a factor of two
 _ALIKE_SHARE = 0.5
-_COUNTED = 1e-6  # probability from which a hypothesis of one group is put with those of others
+# probability from which a hypothesis of one group is put with those of others, and a case lists a
+# set: most products of several groups are nothing
+COUNTED = 1e-4
 
 
 def posterior(
@@ -292,7 +294,7 @@ def _probabilities_alone(group: BlockGroup) -> dict[Hypothesis, float]:
     )
     for hypothesis, share in shares.items():
         weights[hypothesis] = weights.get(hypothesis, 0.0) + undecided * share
-    return {h: p for h, p in weights.items() if p >= _COUNTED or h in WITHOUT_NAME}
+    return {h: p for h, p in weights.items() if p >= COUNTED or h in WITHOUT_NAME}
 
 
 def _leaves_little(group: BlockGroup) -> bool:

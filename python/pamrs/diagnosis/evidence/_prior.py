@@ -29,7 +29,9 @@ from pamrs.effects import (
 )
 from pamrs.findings import DETECTED, Limit
 
-UNLISTED_PRICE = 6.0  # [log odds] price of physics without a name (decision 14)
+# [log odds] price of physics without a name (decision 14), and of an effect with a time constant
+# that recordings do not show
+UNLISTED_PRICE = 6.0
 # odds of a name whose right fit was not found, or has no equation here, to physics without a name:
 # of 31 places that no name explained, an effect of the catalogue acted in 20 (decision 14)
 MISSED_ODDS = 2.0
@@ -37,8 +39,6 @@ MISSED_ODDS = 2.0
 _STANDING_PRICE = 2.0
 # [recordings] lengths of the longest recording beyond which a time constant was not seen
 _UNSEEN_LENGTHS = 3.0
-# [log odds] price of an effect with such a time constant, or with one that is not told from zero
-_UNSEEN_PRICE = 6.5
 # [log odds] the most that a value outside its usual range costs (decision 22)
 _MOST_RANGE_PRICE = 4.0
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
@@ -101,7 +101,7 @@ class Prior:
         """Log odds that a hypothesis loses by values that its physics hardly has."""
         lost = sum(loss_by_value(candidate, name) for name in candidate.fit.effect_values)
         lost += _STANDING_PRICE * _lacks_drift(candidate, self.seconds)
-        return lost + _UNSEEN_PRICE * _has_unseen_time(candidate, self.seconds)
+        return lost + UNLISTED_PRICE * _has_unseen_time(candidate, self.seconds)
 
     def loss_by_term(self, candidate: FittedHypothesis, term: Term) -> float:
         """Log odds that a set loses by one term: price, values and place."""

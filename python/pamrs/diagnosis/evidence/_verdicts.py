@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from pamrs.diagnosis.evidence._candidates import BlockGroup, FittedHypothesis
-from pamrs.diagnosis.evidence._posterior import joint_posteriors, normalised, terms_of
+from pamrs.diagnosis.evidence._posterior import COUNTED, joint_posteriors, normalised, terms_of
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
     CATALOGUE,
@@ -22,8 +22,6 @@ from pamrs.effects import (
 )
 
 _HEALTHY_HYPOTHESES = (NONE, PARAMETERS)  # hypotheses of which nothing is missing
-# probability from which a case lists a set: most products of several blocks are nothing
-_LISTED = 1e-4
 _MOST_SETS = 8  # sets that a case lists
 
 
@@ -164,7 +162,7 @@ def case_probabilities(judged: Sequence[Judged]) -> dict[Hypothesis, float]:
         terms = tuple(terms_of(h for h, _ in choice))
         answer = Hypothesis(terms, "" if terms else _rest(h for h, _ in choice) or NONE.rest)
         answers[answer] = answers.get(answer, 0.0) + math.prod(p for _, p in choice)
-    return normalised({h: p for h, p in answers.items() if p >= _LISTED or h in WITHOUT_NAME})
+    return normalised({h: p for h, p in answers.items() if p >= COUNTED or h in WITHOUT_NAME})
 
 
 def case_ambiguity(judged: Sequence[Judged]) -> list[Hypothesis]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from pamrs.diagnosis.fit._fitting import LEAST_START, Fit
+from pamrs.diagnosis.fit._fitting import Fit
+from pamrs.diagnosis.fit._known_parameters import LEAST_RATIO
 from pamrs.diagnosis.fit._starts import Start, entry_of, form_in
 from pamrs.effects import Term, effect_of, find_parameter
 
@@ -43,5 +44,5 @@ def _off_zero(name: str, value: float) -> float:
     """Value to start a parameter from, at least a share of its typical size: zero has no scale."""
     parameter = find_parameter(name)
     typical = parameter.default or parameter.starts[-1]
-    least = LEAST_START * max(typical, parameter.lower, 1e-3 * parameter.starts[0])
+    least = LEAST_RATIO * max(typical, parameter.lower, 1e-3 * parameter.starts[0])
     return value if abs(value) > least else least

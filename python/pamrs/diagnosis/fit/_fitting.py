@@ -38,7 +38,6 @@ from pamrs.simulation import core_rig, default_step
 
 # share of an effect parameter's usual start that its scale in a fit has at the least
 _LEAST_SCALE = 0.01
-LEAST_START = 1e-3  # share of a typical size from which a parameter goes on that a fit left at zero
 # [s] stable integration step below which a model is not tried: it would take too long
 _LEAST_STEP = 4e-4
 LEAST_STEP_SHARE = 0.2  # the same of a stiff rig, as a share of the step of its nominal model

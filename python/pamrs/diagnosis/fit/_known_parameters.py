@@ -81,7 +81,9 @@ def with_known(
 
 # multiple of its nominal value, or of other walls, for a freed parameter (decision 25)
 _FREED_MULTIPLE = 10.0
-_LEAST_RATIO = 1e-3  # share of its nominal value that a positive parameter has at the least
+# share of its nominal value that a positive parameter has at the least, and of a typical size from
+# which one goes on that a fit left at zero
+LEAST_RATIO = 1e-3
 
 
 def _is_positive(known: Parameter) -> bool:
@@ -133,7 +135,7 @@ def moved_slope(known: Parameter, tolerances: float) -> float:
 def in_tolerances(known: Parameter, value: float) -> float:
     """Distance of a value [SI] from the nominal one, in tolerances."""
     if value < known.value and _is_positive(known):
-        ratio = max(value / known.value, _LEAST_RATIO)
+        ratio = max(value / known.value, LEAST_RATIO)
         return math.log(ratio) * known.value / known.tol
     return (value - known.value) / known.tol
 

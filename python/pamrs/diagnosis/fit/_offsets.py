@@ -18,15 +18,13 @@ from pamrs._arrays import Array, Index
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit._fitting import Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.fit._known_parameters import known_parameters
-from pamrs.diagnosis.prepare import Block, Prepared, change
+from pamrs.diagnosis.prepare import AS_LARGE, Block, Prepared, change
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
 # deviations from none of a command's offset that is applied: each of a few recordings is asked
 _OFFSET_STDS = 4.0
-# variances left with commands moved, or an offset takes physics: healthy 0.95-1.02, a wall 1.45
-_OFFSET_LEFT = 1.1
 # parts of a sample by which rare commands move: a step at 100 Hz is off by 0.08 ms at most
 _OFFSET_PARTS = 64
 # the same of commands that change more often: each part is a step of the integration
@@ -126,7 +124,7 @@ def _worth_moving(
     return {
         k: p
         for k, p in moved.items()
-        if rest[k][0] < missed[k][0] - _OFFSET_STDS**2 and rest[k][0] < _OFFSET_LEFT * rest[k][1]
+        if rest[k][0] < missed[k][0] - _OFFSET_STDS**2 and rest[k][0] < AS_LARGE * rest[k][1]
     }
 
 

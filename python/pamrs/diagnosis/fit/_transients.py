@@ -39,19 +39,16 @@ from pamrs.effects import EffectParameter, Term, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-_SPACING = 0.5  # [s] distance of the times that are tried
+_SPACING = 0.5  # [s] distance of the times that are tried, of two events twice that
 # [s] before an event from which its signature counts: the smoothing of drives reaches back
 _EARLY = 0.1
-_LEAST_DISTANCE = 1.0  # [s] least time between two events
 _LEAST_EVENT_GAIN = 25.0  # [chi-square] gain from which an event counts (decision 20)
 # share of what the recording's residual is from which an event counts (decision 20)
 _EVENT_SHARE = 0.03
 _TIME_SCALE = 0.2  # [s] scale of an event's time, and of its edges' time, in a fit
 _FREQUENCY_SCALE = 0.01  # [Hz] scale of a frequency in a fit
-_LEAST_DURATION = 0.05  # [s] shortest duration of an event
-_MOST_DURATION = 5.0  # [s] longest duration of an event
-_LEAST_RISE = 0.02  # [s] shortest edge of an event (a blow)
-_MOST_RISE = 2.0  # [s] longest edge of an event (a hand)
+_LEAST_DURATION = 0.02  # [s] shortest duration of an event, and of its edges (a blow)
+_MOST_DURATION = 5.0  # [s] longest duration of an event, and of its edges (a hand)
 _MOST_EVENT_SIZE = 1e3  # [SI] largest size of an event that a fit may reach
 
 
@@ -354,7 +351,7 @@ def _scan(
         gains = {
             t: _gain(rest, signature - span @ (span.T @ signature), scaled=size is None)
             for t, signature in signatures.items()
-            if all(abs(t - s) >= _LEAST_DISTANCE for s in chosen)
+            if all(abs(t - s) >= 2.0 * _SPACING for s in chosen)
         }
         best = max(gains, key=lambda t: gains[t], default=0.0)
         if gains.get(best, 0.0) < max(_LEAST_EVENT_GAIN, _EVENT_SHARE * float(rows @ rows)):
@@ -451,7 +448,7 @@ def _limits(effect: Term, parameter: str, prepared: Prepared) -> tuple[float, fl
     limits = {
         "time": (0.0, prepared.n * prepared.dt),
         "duration": (_LEAST_DURATION, _MOST_DURATION),
-        "rise": (_LEAST_RISE, _MOST_RISE),
+        "rise": (_LEAST_DURATION, _MOST_DURATION),
     }
     size = max(info.lower, -_MOST_EVENT_SIZE), min(info.upper, _MOST_EVENT_SIZE)
     if effect.info.own:

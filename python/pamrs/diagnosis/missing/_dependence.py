@@ -22,8 +22,9 @@ _SMOOTHING_RIDGE = 1e-3  # of the rows' weight: what no row tells stays zero
 _CLEARER = 0.05  # share of the square by which a less simple function must tell more
 _LEAST_EXPLAINED = 0.4  # share of the square from which an argument explains the input
 _TURN = 0.02  # of the fastest rate, below which a motion has no direction
-_TREND = 0.8  # correlation from which a size grows or falls with an argument
-_ONE_SIGN_SHARE = 0.8  # mean over mean size from which an input has one direction
+# correlation from which a size grows or falls with an argument, and mean over mean size from which
+# an input has one direction
+_MOSTLY = 0.8
 _OTHER_SIZE = 1.3  # ratio of sizes from which they are not the same
 _EDGES = 100  # of the times in a recording at which an input may begin and end
 _MUCH_LARGER = 3.0  # ratio of root mean squares from which it is there at some times alone
@@ -313,7 +314,7 @@ def _sentence(missing: MissingInput, along: _JoinedInput, name: str, fit: Array)
         noun = spoken_name(missing.position)
         return f"{size_in_words} more while the {noun} {ways[0]}, less while it {ways[1]}{growing}"
     mean, size = along.mean(fit, every), along.mean(np.abs(fit), every)
-    sided = abs(mean) > _ONE_SIGN_SHARE * size
+    sided = abs(mean) > _MOSTLY * size
     size_in_words = _shown(size, missing.unit) + (_sense(missing, mean) if sided else "")
     if not name:
         return f"{size_in_words}, steadily"
@@ -322,7 +323,7 @@ def _sentence(missing: MissingInput, along: _JoinedInput, name: str, fit: Array)
         return f"{size_in_words}, depending on the {noun} and on the direction of its stroke"
     noun, x = ("time" if name == "time" else spoken_name(name)), along.arguments[name]
     trend = float(np.corrcoef(np.abs(fit) if sided else fit, x)[0, 1])
-    if name == "time" or abs(trend) < _TREND:
+    if name == "time" or abs(trend) < _MOSTLY:
         return f"{size_in_words}, depending on the {noun}"
     return f"{size_in_words}, {'growing' if trend > 0.0 else 'falling'} with the {noun}"
 

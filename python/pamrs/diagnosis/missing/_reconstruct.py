@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pamrs import _core
 from pamrs.channels import channel_of
 from pamrs.diagnosis.noise import bins_of
-from pamrs.diagnosis.prepare import Block, Input, Prepared, Residual, binned, residual
+from pamrs.diagnosis.prepare import NOISE_STDS, Block, Input, Prepared, Residual, binned, residual
 from pamrs.errors import SimulationError
 
 _HAT = 0.04  # [s] from knot to knot: twice as fast as the bins of the residual
@@ -23,7 +23,6 @@ _CORRELATION = 6.0  # [knots] over which the input stays what it was
 _INPUT_SIZES = 10.0 ** np.arange(-2.0, 5.1, 0.25)  # of the input, in the noise levels that it moves
 _HORIZONS = ((0.2, 5), (0.5, 4), (1.0, 8))  # shares of a window, and steps: short is linear
 _FIRST_STEPS = 4  # from nothing with whole windows, before short ones are tried
-_FAR = 3.0  # [noise levels] left in a window whose input was not found
 _ENOUGH = 1.5  # [noise levels squared] left in a window from which on no step is needed
 _ALWAYS = 2  # steps that are made in any case: a small input leaves little
 _HALVINGS = 3  # of an input that takes a model out of its range, before it is left out
@@ -278,9 +277,9 @@ def reconstruct(
     windows = _Windows(block, core, prepared, noise, _nothing)
     first = [windows.means[i] for i in windows.bins]
     windows.improve(_FIRST_STEPS)
-    if (windows.mean_squares(windows.means) > _FAR**2).any() and has_port(block):
+    if (windows.mean_squares(windows.means) > NOISE_STDS**2).any() and has_port(block):
         _from_short(windows)
-    followed = windows.mean_squares(windows.means) <= _FAR**2
+    followed = windows.mean_squares(windows.means) <= NOISE_STDS**2
     _, std = windows.most_probable()
     inside = [
         np.arange(knots.start, knots.stop)[windows.time[knots] < prepared.dt * end]

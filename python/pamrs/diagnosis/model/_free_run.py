@@ -19,15 +19,13 @@ from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Block, Prepared, Residual
 from pamrs.effects import EFFECTS, find_parameter, ports_of
 from pamrs.errors import PamrsError, RecordingError
-from pamrs.findings import FreeRun, FreeRunError, Trace
+from pamrs.findings import MOST_MISSED, FreeRun, FreeRunError, Trace
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig, differences, replay
 
 # times more than its block that the whole rig misses of a freed constant before that is said
 _FAR_ALONE = 5.0
-# [noise levels] missed from commands alone from which nothing is settled; true models miss one
-_OFF_NOISES = 5.0
 # chance of values so far from what is known as explain what the whole rig misses
 _OFF_CHANCE = 0.05
 # [K] deviation of a gas's start that nothing tells: filled and vented it is 4 to 28 K off
@@ -199,7 +197,7 @@ def _with_off_channels(
     doubtful = [
         name
         for name, e in run.channels.items()
-        if e.noises > _OFF_NOISES and channel_of(name) not in _FREED
+        if e.noises > MOST_MISSED and channel_of(name) not in _FREED
     ]
     if known is None or not doubtful:
         return run
@@ -215,12 +213,12 @@ def _with_off_channels(
     # drives bring noise into a block, and so into what its channel's error is compared with
     levels = {recorded_as(n): level for n in doubtful if (level := run.channels[n].noise)}
     least = _least_misses(prepared, logged, final, known, prepared.noise | levels)
-    off = {n for n in doubtful if least.get(n, math.inf) > _OFF_NOISES}
+    off = {n for n in doubtful if least.get(n, math.inf) > MOST_MISSED}
     far = {recorded_as(name) for name in off}
     drives = {b.channel: far.intersection(b.drives) for b in blocks if b.mechanical}
     for name in list(off):
         cut, noise = run.channels[name].cut_after, run.channels[name].noise or 0.0
-        follows = cut is not None and cut <= _OFF_NOISES * noise
+        follows = cut is not None and cut <= MOST_MISSED * noise
         if follows and not drives.get(recorded_as(name), far):
             off.discard(name)
     channels = {n: replace(e, off=n in off) for n, e in run.channels.items()}
@@ -261,7 +259,7 @@ def _least_misses(
             now = run(at)
             sizes = {name: float(np.sqrt(np.mean(v**2))) for name, v in now.items()}
             least = {name: min(size, least.get(name, size)) for name, size in sizes.items()}
-            if max(least.values()) <= _OFF_NOISES:
+            if max(least.values()) <= MOST_MISSED:
                 break
             at = _least_missing_step(run, at, now)
     return least
@@ -284,7 +282,7 @@ def _least_missing_step(
     axes, size, directions = np.linalg.svd(slopes, full_matrices=False)
     wanted = axes.T @ (slopes @ at - here)  # along each axis, as an offset from what is known
     # as far as a draw is in as many directions as are seen
-    shown = int(np.sum(size > _OFF_NOISES * math.sqrt(here.size / len(now))))
+    shown = int(np.sum(size > MOST_MISSED * math.sqrt(here.size / len(now))))
     most = float(chi2.isf(_OFF_CHANCE, max(1, shown)))
 
     def far(ridge: float) -> Array:

@@ -50,13 +50,12 @@ from pamrs.report.words import format_number, hypothesis_label, spoken_name
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig, reading
 
-_LEAST_PROBABILITY = 0.01  # probability below which a given hypothesis is not simulated
-# hypotheses that are simulated, the most probable ones (every pair is compared)
-_MOST_HYPOTHESES = 6
-# [bit] difference of information that counts; below it the cheaper experiment is better
-_RESOLUTION = 0.02
-_LEAST_BITS = 0.05  # [bit] expected information below which an experiment parts nothing
-_MOST_SHOWN = 5  # experiments in the ranking
+# hypotheses that are simulated, the most probable ones (every pair is compared), and experiments in
+# the ranking
+_MOST_COMPARED = 6
+# [bit] information that counts: below it an experiment parts nothing, and of two that differ by
+# less the cheaper one is better
+_RESOLUTION = 0.05
 _HOPELESS_SHARE = 0.1  # share of the uncertainty below which the text suggests another sensor
 # ratio of distances to the best recording that there is, below which an experiment adds nothing: a
 # pair that such a recording leaves open is not decided by another one that shows as much
@@ -406,7 +405,7 @@ def propose(
 
     for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
-            enough = len(found) >= _MOST_SHOWN
+            enough = len(found) >= _MOST_COMPARED
             if enough and max(o.bits for o in found) > uncertainty - 0.5 * _RESOLUTION:
                 break  # what is left costs more and cannot tell more
             one = partial(outcome, experiment, sensor)
@@ -431,7 +430,7 @@ def propose(
             RankedExperiment(
                 o.experiment.name, o.experiment.text, o.sensor, round(o.bits, 3), round(o.effort, 1)
             )
-            for o in best_first[:_MOST_SHOWN]
+            for o in best_first[:_MOST_COMPARED]
         ],
         curves=_curves(best, chosen),
         pairs=_pairs(best_first, chosen),
@@ -442,7 +441,7 @@ def propose(
 
 def parts_any(proposal: NextExperiment) -> bool:
     """True where an experiment is expected to part hypotheses at all."""
-    return (proposal.expected_information_bits or 0.0) >= _LEAST_BITS
+    return (proposal.expected_information_bits or 0.0) >= _RESOLUTION
 
 
 def _simulated(experiment: Experiment, hypotheses: Sequence[Modelled]) -> list[Simulation] | None:
@@ -541,9 +540,7 @@ def _checked(hypotheses: Sequence[Modelled]) -> list[Modelled]:
                 f"hypotheses: the probability of {label!r} is {probability}, which is not allowed: "
                 "from 0 to 1"
             )
-    ranked = sorted(hypotheses, key=lambda h: -h[2])
-    likely = [h for h in ranked if h[2] >= _LEAST_PROBABILITY]
-    return likely[:_MOST_HYPOTHESES] or ranked[:1]
+    return sorted(hypotheses, key=lambda h: -h[2])[:_MOST_COMPARED]
 
 
 def _channels(

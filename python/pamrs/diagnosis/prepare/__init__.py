@@ -51,6 +51,7 @@ from pamrs.diagnosis.prepare._residual import (
     with_tanks,
 )
 from pamrs.diagnosis.prepare._signals import (
+    AS_LARGE,
     NOISE_STDS,
     ROUNDING,
     Prepared,
@@ -63,6 +64,7 @@ from pamrs.diagnosis.prepare._signals import (
 )
 
 __all__ = [
+    "AS_LARGE",
     "CLEARLY_LESS",
     "NOISE_STDS",
     "ROUNDING",

@@ -389,8 +389,6 @@ CHECKS: Final = (
 _BEFORE: Final = [check for check in CHECKS if not check.prepared]
 _LOOKED_AT: Final = 20_000
 """Samples of a proposed recording that are looked at: all of a log would take long."""
-_FEW: Final = 8
-"""Questions about a log, or parts of it, that are listed."""
 
 
 @dataclass(frozen=True)
@@ -544,7 +542,7 @@ def questions(proposed: LogProposal, rig: Rig, settings: DiagnosisSettings) -> l
         part = recording.between(stop=min(recording.duration, _LOOKED_AT * recording.sample_time))
         one = Case(part.name, rig, [part], Path())
         found += implausible(part, rig, settings) or _turned(one, settings).texts
-    return list(dict.fromkeys(found))[:_FEW]
+    return list(dict.fromkeys(found))[:MOST_LISTED]
 
 
 def left_out(case: Case, faults: Mapping[str, str]) -> tuple[Case, list[str]]:
@@ -660,7 +658,7 @@ def noted_units(case: Case) -> list[str]:
     for source in dict.fromkeys(recording.source for recording in case.recordings):
         lefts = [recording.left for recording in case.recordings if recording.source == source]
         lost = [part for part in lefts[0] if all(part in lefts_of_one for lefts_of_one in lefts)]
-        some = ", ".join(lost[:_FEW]) + " and so on" * (len(lost) > _FEW)
+        some = ", ".join(lost[:MOST_LISTED]) + " and so on" * (len(lost) > MOST_LISTED)
         if lost:
             notes.append(
                 f"{Path(source).name}: {len(lost)} of the parts of this log ({some}) are in no "
@@ -886,16 +884,12 @@ def _sentence(
     else:
         value = f"{rail:.6g} {next(r.units.get(channel, 'SI') for r in recordings)}"
     counted = [f"{count} in {name}" for name, count in counts.items()]
-    more = len(counted) - _MOST_COUNTED
-    examples = ", ".join(counted[:_MOST_COUNTED]) + f" and more in {more} others" * (more > 0)
+    more = len(counted) - MOST_LISTED
+    examples = ", ".join(counted[:MOST_LISTED]) + f" and more in {more} others" * (more > 0)
     return (
         f"{channel} is clipped: its sensor's range ends at {value}; samples there, and "
         f"their neighbours, were masked in all recordings ({examples})"
     )
-
-
-_MOST_COUNTED = 6
-"""Recordings whose samples are counted."""
 
 
 # share of new samples (no repeats, no lines) from which a thermometer keeps up with the log

@@ -266,16 +266,17 @@ _LEAST_ALIVE = 0.2
 # samples of a window in which noise is compared: its mean differs by a tenth by chance
 WINDOW_SAMPLES = 64
 LEAST_SAMPLES = 3 * WINDOW_SAMPLES  # that are shared at the least
-_LAGS = 8  # shifts in time that are looked at
-# neighbours on either side by which a sample is predicted without the other recording
+# neighbours on either side by which a sample is predicted without the other recording, and samples
+# within which a flip of a converter goes back
 _NEIGHBOURS = 4
 # samples of a block that is looked for in a recording whose clock goes otherwise
 _BLOCK_SAMPLES = 256
 
 
 _SET: Final = ("valve_command", "supply_command", "reference")
-_TAPS: Final = 8  # deviations on either side by which one of the other recording is predicted
-_SOON: Final = 4  # samples within which a flip of a converter goes back
+# deviations on either side by which one of the other recording is predicted, and shifts in time
+# that are looked at
+_REACH: Final = 8
 _ROWS: Final = 20_000  # rows from which a linear combination of a few columns is found
 
 
@@ -571,7 +572,7 @@ def _lags(a: _Deviations, b: _Deviations) -> dict[int, float]:
     shares: dict[int, float] = {}
     pairs = [(a.deviations, b.deviations, 1)]
     if a.step or b.step:  # flips of a converter tell more than what neighbours leave of them
-        pairs.append((np.sign(np.diff(a.values)), np.sign(np.diff(b.values)), _LAGS))
+        pairs.append((np.sign(np.diff(a.values)), np.sign(np.diff(b.values)), _REACH))
     for one, other, most in pairs:
         length = next_fast_len(max(one.size + other.size, 2), real=True)
         cross, power = (
@@ -600,7 +601,7 @@ def _by_window(a: _Deviations, b: _Deviations) -> tuple[Mask, Mask, bool]:
     which they do not, and whether the two differ so clearly that windows can be told apart.
     """
     wanted = a.deviations
-    offsets = np.arange(-_TAPS, _TAPS + 1)
+    offsets = np.arange(-_REACH, _REACH + 1)
     if wanted.size < 4 * offsets.size or not (wanted.any() and b.deviations.any()):
         nothing = np.zeros(wanted.size, dtype=bool)
         return nothing, nothing, False
@@ -648,7 +649,7 @@ def _flips(levels: Array) -> int:
     """
     change = np.diff(levels)
     at = np.flatnonzero(change)
-    back = (change[at[1:]] * change[at[:-1]] < 0.0) & (np.diff(at) <= _SOON)
+    back = (change[at[1:]] * change[at[:-1]] < 0.0) & (np.diff(at) <= _NEIGHBOURS)
     return int(np.count_nonzero(back[1:] & back[:-1]))
 
 
@@ -700,7 +701,8 @@ def _fraction(a: _Deviations, b: _Deviations, dt: float) -> float | None:
     if size < LEAST_SAMPLES or a.step or b.step:
         return None
     index = np.arange(size, dtype=float)
-    smooth, curve = uniform_filter1d(b.values[:size], _SOON), CubicSpline(index, b.values[:size])
+    smooth = uniform_filter1d(b.values[:size], _NEIGHBOURS)
+    curve = CubicSpline(index, b.values[:size])
     inner = (index > 2.0) & (index < size - 3.0) & a.known[:size] & b.known[:size]
     if inner.sum() < LEAST_SAMPLES:
         return None

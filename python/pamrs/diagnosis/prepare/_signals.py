@@ -35,11 +35,11 @@ _LEAST_SPECTRA = 16
 _BAND_SHARE = 0.25
 # [s] stretches at a start that give value and slope; the longest that fits (decision 22)
 _START_REACHES = (0.04, 0.08, 0.16)
-# variance over that of the noise up to which a cubic fits such a stretch (decision 22)
-_START_MISFIT = 1.1
-# deviations by which the shortest stretch may have more, and slopes of two differ (Lepski 1991)
+# ratio of two variances, or errors, that count as equal: a cubic fits the stretch of a start
+# (decision 22); commands moved by an offset leave 0.95 to 1.02 of a healthy rig, 1.45 of a wall
+AS_LARGE = 1.1
+# deviations by which a stretch may have more, and slopes of two differ (Lepski 1991)
 _START_STDS = 2.0
-_START_LONGER_STDS = 1.5  # by which longer ones may have more (decision 22)
 _START_LEAST_SAMPLES = 8  # fewest samples of a stretch: a cubic takes four
 _BRIDGED_SAMPLES = 3  # longest hole in a driving signal that is bridged
 # usual change of a command over as many samples beyond which it steps in a hole: a sine has 1.4
@@ -48,9 +48,9 @@ _STEP_CHANGES = 3.0
 _ROUNDED_STILL = 0.03
 # noise in converter steps below which rounding is not white; at half a step it nearly is
 _ROUNDED_SHARE = 0.5
-# fewest samples of a recording: noise takes eleven, a leak of a shut chamber shows in sixteen
-_RECORDING_LEAST_SAMPLES = 12
-_LEAST_CHANNEL_SAMPLES = 11  # fewest usable samples of a channel
+# fewest samples of a recording, and usable ones of a channel: noise takes eleven, a leak of a shut
+# chamber shows in sixteen
+_FEWEST_SAMPLES = 12
 _LEAST_CHANNEL_SHARE = 0.2  # share of a channel's samples that must be usable
 
 
@@ -463,8 +463,7 @@ def _state(
         cubic = inverse @ (powers.T @ values[rows])
         rest = values[rows] - powers @ cubic
         slope = float(cubic[1]) / (count * dt)
-        scatters = _START_LONGER_STDS if state is not None else _START_STDS
-        most = _START_MISFIT + scatters * math.sqrt(2.0 / (count - 4))
+        most = AS_LARGE + _START_STDS * math.sqrt(2.0 / (count - 4))
         rough = float(rest @ rest) > most * (count - 4) * noise**2
         if state is not None and (rough or abs(slope - state[1]) > _START_STDS * spread):
             break
@@ -569,7 +568,7 @@ def unusable(recording: Recording, rig: Rig, core: _core.Rig, settings: Diagnosi
         That it is too short, or lacks a command or usable samples of a channel that the rig's
         blocks need.
     """
-    length = max(_RECORDING_LEAST_SAMPLES, filter_length(recording.sample_time, settings))
+    length = max(_FEWEST_SAMPLES, filter_length(recording.sample_time, settings))
     if len(recording) < length:
         return f"it has {len(recording)} samples; at least {length} are needed for a diagnosis"
     if why := uncommanded(recording, rig, core.inputs):
@@ -608,7 +607,7 @@ def _as_logged(recording: Recording, name: str) -> Array:
 
 def few_usable(mask: Mask) -> bool:
     """True where too few samples of a channel are usable for a diagnosis."""
-    least = max(_LEAST_CHANNEL_SAMPLES, _LEAST_CHANNEL_SHARE * mask.size)
+    least = max(_FEWEST_SAMPLES, _LEAST_CHANNEL_SHARE * mask.size)
     return bool(mask.sum() < least)
 
 

@@ -51,7 +51,7 @@ from pamrs.diagnosis.noise import (
     no_inflation,
 )
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.diagnosis.search._closure import find_closure
+from pamrs.diagnosis.search._closure import SHORT_EVALUATIONS, find_closure
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import Term, effect_of, ports_of
 from pamrs.errors import SimulationError
@@ -64,14 +64,13 @@ _EMPTIER_SHARE = 0.05
 _EMPTIER_PART = 0.02
 _SEALED_EVALUATIONS = 30  # evaluations of a fit for a rig without a valve, which are cheap
 _POLISH_EVALUATIONS = 10  # evaluations of the last stretch of a fit (decision 22)
-# fits of a set weighted by what it leaves, while correlated variance falls (decision 103)
-_MOST_WEIGHTINGS = 4
-_MOST_TURNS = 3  # in which events and the effects with them are fitted in turn
+# fits of a set weighted by what it leaves, while correlated variance falls (decision 103), and
+# turns in which events and the effects with them are fitted
+_MOST_TURNS = 4
 _LEAST_TURN = 0.8  # share of the sum of squares above which a further turn is not worth it
-_FIRST_EVALUATIONS = 5  # evaluations of a first fit of a set (decision 13)
-# evaluations of a freed parameter's first fit: is it worth a whole one (decision 25); and of a
-# refit of persistent effects with events that stay
-_SHORT_EVALUATIONS = 6
+# alternatives of a kind that are followed: starts of an effect, singles and their partners
+# (decision 13), pairs of parameters, those at their walls (decision 25)
+BEAM = 2
 
 
 Found = TypeVar("Found")
@@ -243,7 +242,7 @@ class Attempts:
             inflation,
             warm,
             events=fitted.events,
-            evaluations=_SHORT_EVALUATIONS,
+            evaluations=SHORT_EVALUATIONS,
         )
         names = [n for n in fitted.values if effect_of(n) == effect]
         return replace(
@@ -369,7 +368,7 @@ class Attempts:
 
         def fit_and_assess() -> FittedHypothesis:
             short = self._fit(
-                starts, self.no_inflation, warm, wrong=wrong, evaluations=_FIRST_EVALUATIONS
+                starts, self.no_inflation, warm, wrong=wrong, evaluations=SHORT_EVALUATIONS
             )
             return replace(self.assess(effects, short), wrong=wrong)
 
@@ -437,7 +436,7 @@ class Attempts:
             self.no_inflation,
             freed=names,
             settled={n: known[n].value for n in others},
-            evaluations=_SHORT_EVALUATIONS,
+            evaluations=SHORT_EVALUATIONS,
         )
 
     def fit_freed_shortly(self, names: tuple[str, ...]) -> FittedHypothesis | None:
@@ -454,7 +453,7 @@ class Attempts:
                 self.no_inflation,
                 warm=self._fit_alone(names),
                 freed=names,
-                evaluations=_SHORT_EVALUATIONS,
+                evaluations=SHORT_EVALUATIONS,
             )
             return replace(self.assess((), short), wrong=names)
 
@@ -529,7 +528,7 @@ class Attempts:
         """Continue a fit of effects and freed parameters until its inflation stops falling."""
         effects = tuple(start.effect for start in starts)
         inflation, fitted = self.inflation_of(warm), warm
-        for _ in range(_MOST_WEIGHTINGS):
+        for _ in range(_MOST_TURNS):
             fitted = self._fit(
                 starts, inflation, fitted, wrong=wrong, evaluations=evaluations, share=share
             )

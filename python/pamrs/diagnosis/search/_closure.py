@@ -47,10 +47,12 @@ from pamrs.rig import Rig
 # share of the misfit that it may leave: with less gain it mends the smoothing of drives
 _MOST_MISFIT_SHARE = 0.75
 _MOST_TERMS = 6  # terms that it may have: more is no form that a person reads
-_EVALUATIONS = 5  # evaluations of the fit of the chosen terms at the most
+# evaluations of the fit of the chosen terms at the most; of a first fit of a set (decision 13) or
+# of a freed parameter (decision 25), which says if a whole one is worth it; and of a refit of
+# persistent effects with events that stay
+SHORT_EVALUATIONS = 5
 # share of the linear estimate from which the fit is tried where the whole of it gains nothing
 _SHRUNK_SHARE = 0.4
-_SHRUNK_EVALUATIONS = 3  # evaluations of that fit at the most
 
 
 @dataclass(frozen=True)
@@ -622,8 +624,7 @@ def _fit_terms(
     say(f"trying {' + '.join(name for name in chosen.values)}")
     names = list(warm.values)
     best: Fit | None = None
-    shrunk = ((1.0, _EVALUATIONS), (_SHRUNK_SHARE, _SHRUNK_EVALUATIONS))
-    for share, evaluations in shrunk:
+    for share in (1.0, _SHRUNK_SHARE):
         starts = {name: share * value for name, value in chosen.values.items()} | chosen.shapes
         shifted = {
             n: warm.values[n] + share * float(x) * warm.scales[n]
@@ -640,7 +641,7 @@ def _fit_terms(
                 fixed=held | fixed,
                 forms=forms,
                 warm=replace(warm, values=shifted),
-                evaluations=evaluations,
+                evaluations=SHORT_EVALUATIONS,
             )
         except SimulationError:
             continue

@@ -23,13 +23,11 @@ from pamrs.diagnosis.fit import Fit, Start, acts_in, fits, form_in, same_data_in
 from pamrs.diagnosis.noise import LEAST_SIZE
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, best_of_each_kind, by_effect, screen
-from pamrs.diagnosis.search._attempts import Attempts
+from pamrs.diagnosis.search._attempts import BEAM, Attempts
 from pamrs.diagnosis.search._baseline import Refit, error_is_given, is_marginal
 from pamrs.diagnosis.search._considered import fit_considered
 from pamrs.diagnosis.search._sets import (
     LEAST_GAIN,
-    MOST_PAIRED,
-    MOST_STARTS,
     NEAR_BEST,
     Say,
     Search,
@@ -223,7 +221,7 @@ def _nearly_as_heavy(
     top = max(map(weight, lasting), default=0.0)
     near = [c for c in lasting[1:] if math.exp(weight(c) - top) > _POLISH_FROM]
     near.sort(key=weight, reverse=True)
-    return [*lasting[:1], *near[: max(MOST_PAIRED - 1, 0)]]
+    return [*lasting[:1], *near[: BEAM - 1]]
 
 
 def is_visible(candidate: FittedHypothesis, start: Start) -> bool:
@@ -417,7 +415,7 @@ def _near_starts(scores: list[Score]) -> list[Score]:
     forms = sorted(forms, key=lambda s: -s.gain)[:_MOST_FORMS]
     alike = [s for s in scores if s.start.kind == scores[0].start.kind]
     near = [s for s in alike if s.gain > _NEAR_START * scores[0].gain]
-    return [*near[:MOST_STARTS], *(s for s in forms if s not in near)]
+    return [*near[:BEAM], *(s for s in forms if s not in near)]
 
 
 def _add_same_data(search: Search, singles: list[FittedHypothesis]) -> list[FittedHypothesis]:

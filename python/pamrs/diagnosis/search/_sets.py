@@ -22,9 +22,9 @@ from pamrs.diagnosis.evidence import (
 )
 from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
 from pamrs.diagnosis.noise import with_sizes
-from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.prepare import CLEARLY_LESS, Block
 from pamrs.diagnosis.screen import Score, Screen, Tangent, best_of_each_kind, by_effect, tangent_of
-from pamrs.diagnosis.search._attempts import Attempts
+from pamrs.diagnosis.search._attempts import BEAM, Attempts
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, far_parameters
 from pamrs.effects import Hypothesis, Term
 
@@ -34,13 +34,9 @@ LEAST_GAIN = 12.0  # [chi-square] gain by the screen from which an effect is fit
 # share of the best gain that fits another place, which alike blocks half show (decision 103), or
 # form, as strong effects are not linear
 NEAR_BEST = 0.3
-MOST_STARTS = 2  # starts of an effect that are fitted (decision 13)
-MOST_PAIRED = 2  # single effects that get a partner (decision 13)
-_MOST_PARTNERS = 2  # partners that each of these gets (decision 13)
 _PARTNER_SHARE = 0.01  # least predicted gain of a partner, as a share of the mismatch (decision 13)
 # share left by the best persistent effect that asks for transient ones (decision 20)
 _LEFT_FOR_TRANSIENT = 0.08
-_MUCH_LEFT = 0.5  # share of a mismatch from which an effect leaves most of it (decision 20)
 
 
 Say = Callable[[str], None]
@@ -117,7 +113,7 @@ def combine(
     """
     roots = search.heaviest_first(c for c in (*singles, *wrong_values) if c.fit.events is None)
     growing = _Growing(search, roots)
-    sets = [s for root in roots[:MOST_PAIRED] for s in growing.widen(root)]
+    sets = [s for root in roots[:BEAM] for s in growing.widen(root)]
     with_events = []
     for effect, partner in _event_partners(search, singles, transient):
         search.tell(f"looking for {effect} with {partner.effects[0]}")
@@ -287,7 +283,7 @@ class _Growing:
         for candidate, start in self._shortly(base, base_starts, further):
             begin = self.attempts.start_of(candidate.fit, start.effect)
             best.setdefault(start.effect, _Partner([begin]))
-        return list(best.values())[:_MOST_PARTNERS]
+        return list(best.values())[:BEAM]
 
     def _shortly(
         self, base: FittedHypothesis, base_starts: list[Start], starts: list[Start]
@@ -307,7 +303,7 @@ class _Growing:
         self, base: FittedHypothesis, base_starts: list[Start], scores: list[Score]
     ) -> _Partner:
         """Partner of a set: an effect from the start that leaves least after a few steps."""
-        starts = [s.start.scaled(s.size) for s in scores[:MOST_STARTS]]
+        starts = [s.start.scaled(s.size) for s in scores[:BEAM]]
         short = self._shortly(base, base_starts, starts if len(starts) > 1 else [])
         return _Partner([short[0][1] if short else starts[0]])
 
@@ -319,7 +315,7 @@ class _Growing:
         # what a term leaves is a mismatch of its own, however large what it takes is
         least = max(LEAST_GAIN, _PARTNER_SHARE * tangent.power_left)
         likely = [e for e, scores in ranked.items() if scores[0].gain > least]
-        best = _one_place_each(likely)[:_MOST_PARTNERS]
+        best = _one_place_each(likely)[:BEAM]
         # what is left in one block may be little next to what another one had: an effect of that
         # block alone is tested by itself
         for block in _blocks_untouched(base, self.search.start, attempts) if alone else []:
@@ -352,7 +348,7 @@ class _Growing:
                 c.wrong,
                 {name: c.fit.values[name] for name in c.wrong},
             )
-            for c in telling[:_MOST_PARTNERS]
+            for c in telling[:BEAM]
         ]
 
 
@@ -375,11 +371,11 @@ def _event_partners(
     attempts, screened, start = search.attempts, search.screened, search.start
     steady = [c for c in singles if c.fit.events is None]
     best = max(steady, key=search.weight, default=start)
-    leaves_some = _LEFT_FOR_TRANSIENT < search.share_left(best) < _MUCH_LEFT
+    leaves_some = _LEFT_FOR_TRANSIENT < search.share_left(best) < CLEARLY_LESS
     pairs = [(e, best) for e in transient] if leaves_some else []
     mismatch = float(screened.tangent.rows @ screened.tangent.rows)
     for single in singles:
-        if single.fit.events is None or search.share_left(single) > _MUCH_LEFT:
+        if single.fit.events is None or search.share_left(single) > CLEARLY_LESS:
             continue
         # what the baseline can do is taken as without the events
         baseline_residuals = start.fit.residuals
@@ -481,7 +477,7 @@ def _blocks_untouched(
         for b in attempts.suspects
         if any(
             significant(now[b.name])
-            and now[b.name].ratio - 1.0 > _MUCH_LEFT * (was[b.name].ratio - 1.0)
+            and now[b.name].ratio - 1.0 > CLEARLY_LESS * (was[b.name].ratio - 1.0)
             for was, now in stages
         )
     ]

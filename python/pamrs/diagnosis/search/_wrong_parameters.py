@@ -27,7 +27,7 @@ from pamrs.diagnosis.fit import (
     two_at_a_time,
 )
 from pamrs.diagnosis.prepare import Block
-from pamrs.diagnosis.search._attempts import Attempts
+from pamrs.diagnosis.search._attempts import BEAM, Attempts
 from pamrs.rig import Rig
 from pamrs.rig.schema import split_name
 
@@ -41,8 +41,6 @@ _NEAR_MISFIT = 2.0
 _SUSPECTED_TOLERANCES = 1.0  # [tolerances] moved by a value whose freeing is looked at
 # [tolerances] moved by a suspect with effects, which take a part of what it would do
 FAR_TOLERANCES = 2.0
-_MOST_FAR = 2  # parameters at their wall that are freed with the effects that leave least
-_MOST_PAIRS = 2  # pairs of parameters that are fitted (decision 25)
 # share of the largest gain from which an effect, or a pair, is fitted (decisions 13, 25)
 LEAST_GAIN_SHARE = 0.08
 # wrong by one mistake: other valve and fittings, load, arm (decision 25)
@@ -137,9 +135,7 @@ def free_suspects(
     # the linear model says little of what is far away: each parameter is fitted, whatever its
     # predicted gain with others
     least = LEAST_GAIN_SHARE * max(gains.values(), default=0.0)
-    pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][
-        :_MOST_PAIRS
-    ]
+    pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][:BEAM]
     candidates = []
     sets = [names for names in gains if len(names) == 1 or names in pairs]
     for names, candidate in _fit_freed(attempts, sets, baseline, say, share).items():
@@ -156,7 +152,7 @@ def far_parameters(attempts: Attempts, fitted: Fit) -> list[str]:
         (name,) for name, moved in fitted.moved.items() if abs(moved) >= FAR_TOLERANCES
     ]
     gains = _worth_a_fit(attempts, fitted, far, attempts.inflation_of(fitted))
-    return [name for (name,) in gains][:_MOST_FAR]
+    return [name for (name,) in gains][:BEAM]
 
 
 def _worth_a_fit(
