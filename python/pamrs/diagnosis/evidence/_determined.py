@@ -15,9 +15,6 @@ from pamrs.effects import Term, effect_of
 _SAME_SHARE = 0.1  # part of an effect's size below which what tells it from another effect is zero
 # standard deviations within which a value, or a difference, is not told from zero
 SAME_STDS = 2.0
-# stated deviations within which a size, or that a value is wrong, is not determined; a stated one
-# is twice the pieces'
-_DETERMINED_STDS = 1.0
 
 
 def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
@@ -34,14 +31,13 @@ def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
 
 
 def has_undetermined_effect(candidate: FittedHypothesis) -> bool:
-    """True where all fitted sizes of an effect together are within one stated standard deviation of
-    zero. Whatever happened at times of its own in single recordings is determined by when it
+    """True where zero is in the stated interval of all fitted sizes of an effect together. Whatever happened at times of its own in single recordings is determined by when it
     happened.
     """
     fitted = candidate.fit
     happened = None if fitted.events is None else fitted.events.effect
     return any(
-        _may_be_none(fitted, effect, _DETERMINED_STDS)
+        _may_be_none(fitted, effect, SAME_STDS)
         for effect in candidate.effects
         if effect != happened
     )
@@ -88,13 +84,13 @@ def is_near_none(distance: float, count: int, stds: float) -> bool:
     return bool(chi2.sf(distance, count) >= chi2.sf(stds**2, 1))
 
 
-def may_be_right(candidate: FittedHypothesis, walls: float, stds: float = _DETERMINED_STDS) -> bool:
+def may_be_right(candidate: FittedHypothesis, walls: float, stds: float = SAME_STDS) -> bool:
     """True where a value called wrong may be right, as :func:`value_may_be_right` has it."""
     return any(value_may_be_right(candidate.fit, name, walls, stds) for name in candidate.wrong)
 
 
 def value_may_be_right(
-    fitted: Fit, name: str, walls: float, stds: float = _DETERMINED_STDS
+    fitted: Fit, name: str, walls: float, stds: float = SAME_STDS
 ) -> bool:
     """True where a fitted value is inside its tolerances (`walls` of them) or less than `stds`
     standard deviations outside, or where its interval of 95 % holds the value of the file.

@@ -122,7 +122,7 @@ def _with_verdict(
     without = shown[UNLISTED]
     best = max(named, key=lambda h: named[h], default=UNDECIDED)
     ambiguity = _left_open(normalised(shown), settings)
-    if probabilities.get(healthy, 0.0) >= max(without, named.get(best, 0.0)):
+    if nothing + unseen >= max(without, named.get(best, 0.0)):
         return Judged(group, healthy.rest, probabilities, ambiguity, start, unseen)
     marginal = [sum(p for h, p in named.items() if term in h.terms) for term in terms_of(named)]
     if named.get(best, 0.0) <= without and max(marginal, default=0.0) <= settings.named:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from pamrs import _core
-from pamrs.channels import block_of, channel_of, dotted, rate_of, unit_of
+from pamrs.channels import block_of, channel_of, dotted, rate_of, unit_of, with_trait
 from pamrs.diagnosis.fit import Key, Problem
 from pamrs.diagnosis.missing._dependence import with_words
 from pamrs.diagnosis.missing._reconstruct import (
@@ -23,7 +23,7 @@ from pamrs.diagnosis.prepare import Block, Prepared, residual
 from pamrs.errors import SimulationError
 from pamrs.findings import MissingInput, MissingRecording
 
-_MOTION = ("joint_angle", "length")
+_MOTION = with_trait("moves")
 
 
 def worst_block(problem: Problem, noise_level: Mapping[Key, NoiseLevel]) -> Block:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.channels import DRIVEN_COMMANDS, block_of, channel_of
+from pamrs.channels import DRIVEN_COMMANDS, block_of, channel_of, with_trait
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -41,7 +41,7 @@ _GAUGES = ("muscle_pressure", "joint_angle")
 """Channels whose gauges have one."""
 _GAUGE_SHARE = 0.1
 """That of a gauge's range over that of a block: gauges are linear to a tenth of a percent."""
-_MOTION = ("joint_angle", "length")
+_MOTION = with_trait("moves")
 
 
 def curve_errors_of(rig: Rig, usual: float) -> CurveErrors:
