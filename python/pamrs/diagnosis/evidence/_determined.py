@@ -31,8 +31,8 @@ def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
 
 
 def has_undetermined_effect(candidate: FittedHypothesis) -> bool:
-    """True where zero is in the stated interval of all fitted sizes of an effect together. Whatever happened at times of its own in single recordings is determined by when it
-    happened.
+    """True where zero is in the stated interval of all fitted sizes of an effect together. Whatever
+    happened at times of its own in single recordings is determined by when it happened.
     """
     fitted = candidate.fit
     happened = None if fitted.events is None else fitted.events.effect
