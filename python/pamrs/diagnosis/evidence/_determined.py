@@ -27,7 +27,7 @@ def is_absent(candidate: FittedHypothesis, walls: float) -> bool:
         return True
     if fitted.events is not None:
         return False
-    return any(_may_be_none(fitted, effect, SAME_STDS) for effect in candidate.effects)
+    return any(_may_be_none(fitted, effect) for effect in candidate.effects)
 
 
 def has_undetermined_effect(candidate: FittedHypothesis) -> bool:
@@ -36,14 +36,10 @@ def has_undetermined_effect(candidate: FittedHypothesis) -> bool:
     """
     fitted = candidate.fit
     happened = None if fitted.events is None else fitted.events.effect
-    return any(
-        _may_be_none(fitted, effect, SAME_STDS)
-        for effect in candidate.effects
-        if effect != happened
-    )
+    return any(_may_be_none(fitted, effect) for effect in candidate.effects if effect != happened)
 
 
-def _may_be_none(fitted: Fit, effect: Term, stds: float) -> bool:
+def _may_be_none(fitted: Fit, effect: Term) -> bool:
     """True where all sizes of an effect together may be zero, by the covariance of its fit, as wide
     as its standard deviations are now.
 
@@ -66,7 +62,8 @@ def _may_be_none(fitted: Fit, effect: Term, stds: float) -> bool:
     known = np.linalg.pinv(spread * np.outer(wider, wider), hermitian=True)
     size = np.array(values)[is_size]
     distance = size @ known[np.ix_(is_size, is_size)] @ size
-    return is_near_none(distance, len(sizes), stds)
+    # as likely to be zero as one size at so many standard deviations
+    return bool(chi2.sf(distance, len(sizes)) >= chi2.sf(SAME_STDS**2, 1))
 
 
 def fitted_sizes(fitted: Fit, effect: Term) -> list[str]:
@@ -77,21 +74,12 @@ def fitted_sizes(fitted: Fit, effect: Term) -> list[str]:
     return [name for p in sizes if (name := f"{effect}.{p.name}") in fitted.values]
 
 
-def is_near_none(distance: float, count: int, stds: float) -> bool:
-    """True where `count` sizes, at a squared distance from zero, are at least as likely to be zero
-    as one size at `stds` standard deviations.
-    """
-    return bool(chi2.sf(distance, count) >= chi2.sf(stds**2, 1))
-
-
-def may_be_right(candidate: FittedHypothesis, walls: float, stds: float = SAME_STDS) -> bool:
+def may_be_right(candidate: FittedHypothesis, walls: float, stds: float = 1.0) -> bool:
     """True where a value called wrong may be right, as :func:`value_may_be_right` has it."""
     return any(value_may_be_right(candidate.fit, name, walls, stds) for name in candidate.wrong)
 
 
-def value_may_be_right(
-    fitted: Fit, name: str, walls: float, stds: float = SAME_STDS
-) -> bool:
+def value_may_be_right(fitted: Fit, name: str, walls: float, stds: float = 1.0) -> bool:
     """True where a fitted value is inside its tolerances (`walls` of them) or less than `stds`
     standard deviations outside, or where its interval of 95 % holds the value of the file.
     """
