@@ -26,8 +26,8 @@ Divided = tuple[Problem, Problem, list[Unjudged]]
 def promising_laws(
     rig: Rig, problem: Problem, stated_diagnosis: Diagnosis, prepared: Callable[[Rig], Divided]
 ) -> Iterator[tuple[OtherChoice, Divided]]:
-    """Other laws, with the recordings under each, whose baseline misses a suspect block by clearly
-    less than that of the rig file.
+    """The other law of the gas, and of the muscle, whose baseline misses suspect blocks least, by
+    clearly less than that of the rig file, with the recordings under it.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def promising_laws(
         if not any(b.name in suspects for b in blocks):
             continue
         names = [b.name for b in blocks]
-        stated = _missed(rig, problem, names)
+        best, least = None, CLEARLY_LESS * _missed(rig, problem, names)
         for choice in other_choices(rig, ("muscle",) if mechanical else ("chamber", "valve")):
             if _is_an_effect(choice):
                 continue
@@ -55,8 +55,10 @@ def promising_laws(
                 missed = _missed(choice.rig, divided[0], names)
             except PamrsError:
                 continue  # a rig that these recordings cannot be of
-            if missed < CLEARLY_LESS * stated:
-                yield choice, divided
+            if missed < least:
+                best, least = (choice, divided), missed
+        if best is not None:
+            yield best
 
 
 def _is_an_effect(choice: OtherChoice) -> bool:

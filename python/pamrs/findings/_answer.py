@@ -258,18 +258,16 @@ def answer_of(
     sure = all(p.sure for p in parts)
     # that something acts which has no name decides nothing about what it is
     nameless = any(p.words == ("unlisted",) for p in parts)
-    unseen = False
-    if not (parts or missed or other_law):
-        chance = math.prod(p.probability for p in quiet)
-        unseen = chance <= enough
-    why = "missed" if missed else "sets" if open_ else "name" if sure else "probability"
-    why = "unseen" if unseen else why
+    nothing = not (parts or missed or other_law)
+    chance = math.prod(p.probability for p in quiet) if nothing else chance
+    unseen = nothing and chance <= enough
+    why = "unseen" if unseen else "name" if sure else "probability"
     settled = not missed and sure and not nameless and not unseen
     verdicts = [*(p.group.verdict for p in every), *["parameters"] * other_law]
     return Answer(
         verdict=case_verdict(verdicts, missed=bool(missed)),
         settled=settled,
-        why="" if settled else why,
+        why="" if settled else "missed" if missed else "sets" if open_ else why,
         block=parts[0].block if parts else None,
         names=list(names),
         probability=chance,
