@@ -408,14 +408,13 @@ def _diagnosis_in_units_said(
         unseen = odds_of_unseen(limits.acting(), fit_problem.settings)
         groups = [replace(g, unseen=sum(unseen.get(b.name, 0.0) for b in g.blocks)) for g in groups]
     conclusion = conclude(case.rig, fit_problem, held_out_problem, groups)
-    diagnosis = assemble(case, fit_problem, held_out_problem, groups, conclusion, unjudged)
-    if limits is not None:
-        beyond_noise = {
-            b.name: beyond(error.after, error.noise, conclusion.own_errors[b.channel])
-            for b in fit_problem.blocks
-            if (error := conclusion.table.get(b.channel))
-        }
-        diagnosis = replace(diagnosis, limits=limits.acting(beyond_noise))
+    beyond_noise = {
+        b.name: beyond(error.after, error.noise, conclusion.own_errors[b.channel])
+        for b in fit_problem.blocks
+        if (error := conclusion.table.get(b.channel))
+    }
+    shown = [] if limits is None else limits.acting(beyond_noise)
+    diagnosis = assemble(case, fit_problem, held_out_problem, groups, conclusion, unjudged, shown)
     proposal = fit_problem.losses.part(
         "the next experiment",
         lambda: next_to_record(

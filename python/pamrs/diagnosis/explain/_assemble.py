@@ -53,6 +53,7 @@ from pamrs.findings import (
     EffectFound,
     EffectParameterFound,
     FitErrors,
+    Limit,
     ParameterFound,
     StageError,
     Tested,
@@ -76,6 +77,7 @@ def assemble(
     groups: list[BlockGroup],
     conclusion: Conclusion,
     unjudged: Sequence[Unjudged] = (),
+    limits: Sequence[Limit] = (),
 ) -> Diagnosis:
     """Build the diagnosis from the groups of blocks and what was concluded of them.
 
@@ -91,6 +93,8 @@ def assemble(
         Model, errors, budget and free runs.
     unjudged : sequence of Unjudged
         Blocks of the rig that are not judged.
+    limits : sequence of Limit
+        Sizes from which the recordings would have shown effects.
     """
     nominal, models, judged = case.rig, conclusion.models, conclusion.judged
     verdict, noise_level, part = models.verdict, conclusion.noise_level, fit_problem.losses.part
@@ -100,15 +104,8 @@ def assemble(
     changed = models.added or any(j.wrong for j in judged)
     fit_residuals, errors = conclusion.fit_residuals, conclusion.errors
     held_out_residuals, table = conclusion.held_out_residuals, conclusion.table
-    blocks = block_entries(
-        judged,
-        fit_problem,
-        fit_residuals,
-        held_out_problem,
-        held_out_residuals,
-        noise_level,
-        conclusion.own_errors,
-    )
+    recorded = fit_problem, fit_residuals, held_out_problem, held_out_residuals
+    blocks = block_entries(judged, *recorded, noise_level, conclusion.own_errors)
     forms = _forms(models, fit_problem)
     stages = [(fit_problem, fit_residuals)]
     if held_out_problem is not fit_problem:
@@ -149,6 +146,7 @@ def assemble(
         free_run=conclusion.runs,
         free_run_note=conclusion.runs_note,
         free_traces=conclusion.curves,
+        limits=list(limits),
         settings=fit_problem.settings,
     )
     notes = [

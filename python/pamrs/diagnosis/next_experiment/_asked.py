@@ -307,8 +307,8 @@ def _of_unseen(asked: _Question, limits: Iterable[Limit]) -> NextExperiment:
     """
     hidden = Counter(limit.block for limit in limits if limit.verdict == "not seen")
     block = max(asked.blocks, key=lambda b: hidden[b.name])
-    begin = "Most of what these recordings would hardly show acts there"
-    return asked.answer(f"{begin}. For the {spoken_name(block.name)}", block)
+    begin = f"Most of what these recordings would hardly show acts in the {spoken_name(block.name)}"
+    return asked.answer(f"{begin}. There", block)
 
 
 def _of_whole(asked: _Question, diagnosis: Findings) -> NextExperiment:
