@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.fit import Fit, Problem, fit
 from pamrs.diagnosis.noise import no_inflation
 from pamrs.diagnosis.prepare import AS_LARGE, CLEARLY_LESS, Unjudged
 from pamrs.diagnosis.result import Diagnosis
@@ -46,18 +46,21 @@ def promising_laws(
         if not any(b.name in suspects for b in blocks):
             continue
         names = [b.name for b in blocks]
-        best, least = None, CLEARLY_LESS * _missed(rig, problem, names)
+        best, least = None, math.inf
         for choice in other_choices(rig, ("muscle",) if mechanical else ("chamber", "valve")):
             if _is_an_effect(choice):
                 continue
             try:
                 divided = prepared(choice.rig)
-                missed = _missed(choice.rig, divided[0], names)
+                missed = _missed(choice.rig, divided[0], names, _fit_briefly)
             except PamrsError:
                 continue  # a rig that these recordings cannot be of
             if missed < least:
                 best, least = (choice, divided), missed
-        if best is not None:
+        # only the one that is left is refitted to its end
+        if best is not None and _missed(best[0].rig, best[1][0], names) < CLEARLY_LESS * _missed(
+            rig, problem, names
+        ):
             yield best
 
 
@@ -68,14 +71,24 @@ def _is_an_effect(choice: OtherChoice) -> bool:
     return any(form.name == choice.other for effect in own for form in effect.forms)
 
 
-def _missed(rig: Rig, problem: Problem, names: Sequence[str]) -> float:
+def _fit_briefly(problem: Problem, rig: Rig, inflation: dict[str, float]) -> Fit:
+    """Baseline of a rig after the few evaluations of a first fit."""
+    return fit(problem, rig, (), {}, inflation)
+
+
+def _missed(
+    rig: Rig,
+    problem: Problem,
+    names: Sequence[str],
+    refit: Callable[[Problem, Rig, dict[str, float]], Fit] = refitted,
+) -> float:
     """Sum of squares that some blocks leave, refitted inside their tolerances; infinite where one
     is not there.
     """
     blocks = [b for b in problem.blocks if b.name in names]
     if len(blocks) < len(names):
         return math.inf
-    return 2.0 * refitted(replace(problem, blocks=blocks), rig, no_inflation(blocks)).cost
+    return 2.0 * refit(replace(problem, blocks=blocks), rig, no_inflation(blocks)).cost
 
 
 def is_better(other: Diagnosis, stated: Diagnosis) -> bool:

@@ -143,8 +143,7 @@ def products_of(
             means, counts = binned(free * tolerances, base_residual.rows, bins_of(prepared))
             curves = np.empty((means.shape[0], 0)) if level.curves is None else level.curves
             share = counted(prepared, block, problem.settings) / max(1, int((counts > 0).sum()))
-            noise = level.binned_noise
-            weights[place] = math.sqrt(share) / noise if noise > 0.0 else 0.0
+            weights[place] = math.sqrt(share) / (level.binned_noise or math.inf)
             columns[place] = [curves, means, np.zeros((means.shape[0], len(starts)))]
     for k, start in enumerate(starts):
         acting = replace(problem, blocks=[b for b in problem.blocks if acts_in(start.effect, b)])
@@ -271,8 +270,8 @@ class Limits:
             (block, recording): values / left.get(block.name, 1.0) ** 2
             for (block, recording), values in self._products.items()
         }
-        each = Limits(scaled, *self._given).each if left else self.each
-        return [limit for limit in each.values() if limit.block]
+        limits = Limits(scaled, *self._given) if left else self
+        return [limit for limit in limits.each.values() if limit.block]
 
     def _taken(self, name: str, rivals: Mask) -> Array:
         """Part of an effect's squared signature that each rival column takes at its best size."""

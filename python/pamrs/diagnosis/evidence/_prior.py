@@ -129,11 +129,10 @@ def odds_of_unseen(limits: Iterable[Limit], settings: DiagnosisSettings) -> dict
     every = list(limits)
     odds = dict.fromkeys((limit.block for limit in every), 0.0)
     places = Counter(Term.parse(limit.effect).id for limit in every)
-    price = settings.name_price + settings.parameter_price
     for limit in every:
         below = math.log(DETECTED / max(limit.seen, 1e-300)) / SIZE_SPREAD
         share = float(norm.cdf(below)) / places[Term.parse(limit.effect).id]
-        odds[limit.block] += share * math.exp(-price)
+        odds[limit.block] += share * math.exp(-settings.name_price - settings.parameter_price)
     return odds
 
 

@@ -307,8 +307,11 @@ def _of_unseen(asked: _Question, limits: Iterable[Limit]) -> NextExperiment:
     """
     hidden = Counter(limit.block for limit in limits if limit.verdict == "not seen")
     block = max(asked.blocks, key=lambda b: hidden[b.name])
-    begin = f"Most of what these recordings would hardly show acts in the {spoken_name(block.name)}"
-    return asked.answer(f"{begin}. There", block)
+    return asked.answer(
+        f"Most of what these recordings would hardly show acts in the {spoken_name(block.name)}. "
+        "There",
+        block,
+    )
 
 
 def _of_whole(asked: _Question, diagnosis: Findings) -> NextExperiment:
