@@ -113,14 +113,16 @@ def test_a_quiet_command_says_nothing_between(monkeypatch):
     assert not said
 
 
-def test_a_shell_gets_its_script():
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_gets_its_script(shell):
     asked = {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
     done = subprocess.run(
         [sys.executable, "-c", "import sys; from pamrs.cli import main; sys.exit(main())"]
-        + ["--show-completion", "bash"],
+        + ["--show-completion", shell],
         env={**os.environ, **asked}, capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert "_PAMRS_COMPLETE=complete_bash" in done.stdout
+    assert "_PAMRS_COMPLETE" in done.stdout
+    assert f"complete_{shell}" in done.stdout
 
 
 def completions(*words):

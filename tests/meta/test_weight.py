@@ -25,7 +25,7 @@ PACKAGES = {
     "cli": 1407,
     "control": 4596,
     "design": 530,
-    "diagnosis": 11142,
+    "diagnosis": 11146,
     "effects": 404,
     "experiments": 1078,
     "findings": 965,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 28011,
+    "tests": 28012,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1235,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37304
+MOST = 37308
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

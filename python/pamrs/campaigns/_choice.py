@@ -205,8 +205,8 @@ def proposed(
             return found
     if not any(label == str(NONE) for label, _, _ in rivals):
         rivals.append((str(NONE), rig, 0.0 if rivals else 1.0))  # what the rig file says
-    unseen = diagnosis is not None and diagnosis.answer.why == "unseen" and not repeat
-    if own.protocol is not None and own.protocol.name in allowed and not unseen:
+    hidden = diagnosis is not None and diagnosis.answer.why == "unseen" and not repeat
+    if own.protocol is not None and own.protocol.name in allowed and not hidden:
         return ProposedRun(allowed[own.protocol.name], own.text, repeat, rivals)
     if repeat:
         name = next(iter(allowed), "")

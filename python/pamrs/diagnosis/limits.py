@@ -42,14 +42,7 @@ from pamrs.findings import DETECTED, TOLD_APART, Limit
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-__all__ = [
-    "Limits",
-    "Products",
-    "counted",
-    "limits_of",
-    "possible_starts",
-    "products_of",
-]
+__all__ = ["Limits", "Products", "counted", "limits_of", "possible_starts", "products_of"]
 
 _MOST_MULTIPLE = 1e4  # [typical sizes] largest size of an effect that is worth telling
 # halvings of a size until a rig can have it: below a hundredth it is another effect
@@ -265,7 +258,7 @@ class Limits:
         """Limits of the effects that act in a block; more than one noise level that a diagnosis
         leaves unexplained of a block counts as noise.
         """
-        left = {name: max(1.0, size) for name, size in (unexplained or {}).items()}
+        left = {name: size for name, size in (unexplained or {}).items() if size > 1.0}
         scaled = {
             (block, recording): values / left.get(block.name, 1.0) ** 2
             for (block, recording), values in self._products.items()

@@ -42,6 +42,8 @@ _ORDER_MARGIN = 0.05
 _ORDER_OFFSET = 1e4  # [Pa] pressure by which it may exceed it besides (zeros of two transducers)
 # share of the time for which it may exceed it by more, or a command its span
 _MOST_TIME_SHARE = 0.5
+_LEAST_ANGLE_MARGIN = 0.1  # [rad] by which a joint may leave its range at the least
+_LEAST_LENGTH_MARGIN = 0.01  # [m] by which a load may leave its range at the least
 _RANGE_TIME_SHARE = 0.2  # share of the time for which it may leave its range by more
 _FASTEST_LOAD = 20.0  # [m/s] speed of a load that one sample in a hundred may exceed
 # [Pa] change of a muscle's pressure that moves its tank's, and from which its sense is tested
@@ -50,9 +52,10 @@ _LEAST_CHANGE = 2e4
 _FROZEN_MOTION_SHARE = 0.1
 # share of a pressure's change against its command; motion and leaks do some of it as well
 _OPPOSED_SHARE = 0.6
-# change of an angle or a length, as a share of its range, up to which the muscles' volume hardly
-# moves their pressure
-_STILL_SHARE = 0.01
+_OPPOSED_CORRELATION = -0.2  # correlation of command and change below which that counts
+# [rad] change of an angle up to which the muscles' volume hardly moves their pressure
+_STILL_ANGLE = 0.02
+_STILL_LENGTH = 1e-3  # [m] change of a load's length up to which volume hardly moves pressure
 # [half ranges] distance of a command from its null beyond which it is another column or unit
 _COMMAND_SPAN = 2.0
 # [s] rest and change that one value of a valve's command cannot have made: leaks are slower
@@ -374,7 +377,7 @@ def _moving(rig: Rig, settings: DiagnosisSettings) -> list[_Moving]:
     for joint, table in rig.tables("joint").items():
         low, high = float(table["min_angle"]), float(table["max_angle"])
         pulled = tuple(block_of(e["chamber"]) for e in ends if e["joint"] == dotted("joint", joint))
-        margin = settings.range_margin * (high - low)
+        margin = max(_LEAST_ANGLE_MARGIN, settings.range_margin * (high - low))
         moving.append(
             _Moving(
                 dotted("joint_angle", joint),
@@ -390,7 +393,7 @@ def _moving(rig: Rig, settings: DiagnosisSettings) -> list[_Moving]:
     if load and load["kind"] == "mass":
         low, high = float(load["min_length"]), float(load["max_length"])
         pulled = tuple(block_of(e["chamber"]) for e in ends)
-        margin = settings.range_margin * (high - low)
+        margin = max(_LEAST_LENGTH_MARGIN, settings.range_margin * (high - low))
         moving.append(_Moving("length", "m", low, high, margin, _FASTEST_LOAD, pulled))
     return moving
 
@@ -453,9 +456,9 @@ def impossible_motion(recording: Recording, rig: Rig, settings: DiagnosisSetting
             )
 
 
-def reversed_valves(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
+def reversed_valves(recording: Recording, rig: Rig, _: DiagnosisSettings) -> Iterator[str]:
     """Findings on commands outside the valve's range, and on pressures that go against them."""
-    still_by = {m.channel: _STILL_SHARE * (m.high - m.low) for m in _moving(rig, settings)}
+    still_by = {"joint_angle": _STILL_ANGLE, "length": _STILL_LENGTH}
     inlets = {dotted("line", name): e["to"] for name, e in rig.ports("line").items()}
     for valve, ends in rig.ports("valve").items():
         name, table = dotted("valve_command", valve), rig.tables("valve")[valve]
@@ -486,7 +489,9 @@ def reversed_valves(recording: Recording, rig: Rig, settings: DiagnosisSettings)
         rows = np.flatnonzero(both[:-width] & both[width // 2 : -width + width // 2] & both[width:])
         # what swings moves the pressure by its volume, whatever the valve does
         for place, still in (
-            (v, still_by[c]) for c, v in recording.channels.items() if c in still_by
+            (v, still_by[channel_of(c)])
+            for c, v in recording.channels.items()
+            if channel_of(c) in still_by
         ):
             rows = rows[~(np.abs(place[rows + width] - place[rows]) > still)]
         change = recording.channels[pressure][rows + width] - recording.channels[pressure][rows]
@@ -503,7 +508,7 @@ def reversed_valves(recording: Recording, rig: Rig, settings: DiagnosisSettings)
             continue
         against = float(np.abs(change)[towards * change < 0.0].sum() / np.abs(change).sum())
         correlation = float(np.corrcoef(towards, change)[0, 1])
-        if against > _OPPOSED_SHARE and correlation < 0.0:
+        if against > _OPPOSED_SHARE and correlation < _OPPOSED_CORRELATION:
             yield (
                 f"{100 * against:.0f} % of the change of {pressure} goes against {name} (rises "
                 "while it says vent, falls while it says fill); at most "
