@@ -19,16 +19,16 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from pamrs._progress import Steps
+from pamrs._progress import Line, Steps
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.evidence import BlockGroup, odds_of_unseen
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, Unfollowed, fits, free_baseline, with_offsets
-from pamrs.diagnosis.laws import is_better, promising_laws, under
+from pamrs.diagnosis.laws import is_better, names_open, promising_laws, under
 from pamrs.diagnosis.limits import Limits, limits_of
 from pamrs.diagnosis.missing import missing_input_of, worst_block
 from pamrs.diagnosis.model import Conclusion, conclude, refitted_rig
@@ -323,14 +323,13 @@ def _diagnosis_of_checked_case(
             lambda: _with_offsets(fit_problem, held_out_problem, case.rig),
         )
         fit_problem, held_out_problem, moved = shifted or (fit_problem, held_out_problem, [])
-        stated, judged, unjudged = _diagnosis_in_units_said(
-            case, fit_problem, held_out_problem, unjudged, say
-        )
+        stated = _answered(case, fit_problem, held_out_problem, unjudged, say)
         what = "the look at other laws of the rig"
-        diagnosis = fit_problem.losses.part(
-            what, lambda: _under_best_law(case, considered, fit_problem, stated), stated
+        best = fit_problem.losses.part(
+            what, lambda: _under_best_law(considered, fit_problem, stated, say), stated
         )
-        fit_problem = judged
+        diagnosis = _completed(best)
+        fit_problem, unjudged = stated.fit_problem, stated.unjudged
     # the first few are all that a terminal shows: first what may make the answer wrong
     # a unit that is found settles what was doubted under the one that was said
     doubts = checked.doubts if misread is None else []
@@ -374,16 +373,40 @@ def _case_with_own_model(case: Any, data: Any, *, allow_outside: bool) -> Case:
     return case if isinstance(case, Case) else load_case(case, allow_outside=allow_outside)
 
 
-def _diagnosis_in_units_said(
+@dataclass(frozen=True, eq=False)
+class _Answered:
+    """Diagnosis without the next experiment and the missing input, and what these are made from.
+
+    Attributes
+    ----------
+    case : Case
+        Rig and recordings.
+    fit_problem, held_out_problem : Problem
+        The recordings with the blocks that were judged.
+    unjudged : list of Unjudged
+        The blocks that were not.
+    conclusion : Conclusion
+        Chosen hypotheses, final model, free runs.
+    diagnosis : Diagnosis
+        Verdict, names, errors.
+    """
+
+    case: Case
+    fit_problem: Problem
+    held_out_problem: Problem
+    unjudged: list[Unjudged]
+    conclusion: Conclusion
+    diagnosis: Diagnosis
+
+
+def _answered(
     case: Case,
     fit_problem: Problem,
     held_out_problem: Problem,
     unjudged: list[Unjudged],
     say: Steps,
-) -> tuple[Diagnosis, Problem, list[Unjudged]]:
-    """Diagnosis once no wrong unit was found; with it the recordings with the blocks that were
-    judged, and those that were not.
-    """
+) -> _Answered:
+    """Answer once no wrong unit was found."""
     every = fit_problem.blocks
     motion = [b for b in fit_problem.blocks if b.mechanical]
     parts = [[b for b in fit_problem.blocks if not b.mechanical], motion]
@@ -400,7 +423,8 @@ def _diagnosis_in_units_said(
         groups = [_scaled_for_unknown_geometry(g, _UNKNOWN_GEOMETRY_FACTOR) for g in groups]
     say("putting the answer together", _JUDGED[1])
     judged_names, failed = {block.name for block in fit_problem.blocks}, "its judgement failed"
-    unjudged += [Unjudged(b.name, b.covers, failed) for b in every if b.name not in judged_names]
+    failures = [Unjudged(b.name, b.covers, failed) for b in every if b.name not in judged_names]
+    unjudged = [*unjudged, *failures]
     limits = fit_problem.losses.part(
         "the limits", lambda: _limits(case.rig, groups, fit_problem, held_out_problem)
     )
@@ -415,13 +439,30 @@ def _diagnosis_in_units_said(
     }
     shown = [] if limits is None else limits.acting(beyond_noise)
     diagnosis = assemble(case, fit_problem, held_out_problem, groups, conclusion, unjudged, shown)
+    warnings = [*slack, *diagnosis.warnings]
+    if unsettled:
+        what = "length" if case.rig.model["load"] else "angle"
+        warning = (
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the "
+            f"{what} as an effect would, so the probability of an effect of muscles and what they "
+            f"move is multiplied by {_UNKNOWN_GEOMETRY_FACTOR:g}"
+        )
+        warnings.insert(0, warning)
+    diagnosis = replace(diagnosis, warnings=warnings)
+    return _Answered(case, fit_problem, held_out_problem, unjudged, conclusion, diagnosis)
+
+
+def _completed(answered: _Answered) -> Diagnosis:
+    """Diagnosis with the next experiment and the missing input."""
+    fit_problem, held_out_problem = answered.fit_problem, answered.held_out_problem
+    diagnosis, conclusion = answered.diagnosis, answered.conclusion
     proposal = fit_problem.losses.part(
         "the next experiment",
         lambda: next_to_record(
             diagnosis,
             conclusion.ambiguity,
             conclusion.hypotheses(fit_problem),
-            case.rig,
+            answered.case.rig,
             conclusion.judged,
             fit_problem,
             held_out_problem,
@@ -437,41 +478,37 @@ def _diagnosis_in_units_said(
         first = missing.times[0].recording
         spans = [[t.start, t.stop] for t in missing.times if t.recording == first]
         where = replace(where, recording=first, intervals=sorted(spans))
-    diagnosis = replace(
-        diagnosis,
-        where=where,
-        missing_input=missing,
-        next_experiment=proposal,
-        warnings=[*slack, *diagnosis.warnings],
-    )
-    if unsettled:
-        what = "length" if case.rig.model["load"] else "angle"
-        warning = (
-            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the "
-            f"{what} as an effect would, so the probability of an effect of muscles and what they "
-            f"move is multiplied by {_UNKNOWN_GEOMETRY_FACTOR:g}"
-        )
-        diagnosis = replace(diagnosis, warnings=[warning, *diagnosis.warnings])
-    return diagnosis, fit_problem, unjudged
+    return replace(diagnosis, where=where, missing_input=missing, next_experiment=proposal)
 
 
 def _under_best_law(
-    case: Case, considered: tuple[Hypothesis, ...], fit_problem: Problem, stated: Diagnosis
-) -> Diagnosis:
-    """Diagnosis under the best of other laws where the rig file's laws leave a mismatch."""
+    considered: tuple[Hypothesis, ...], fit_problem: Problem, stated: _Answered, say: Steps
+) -> _Answered:
+    """Answer under the best of other laws where the rig file's laws leave a mismatch."""
+    case, answer = stated.case, stated.diagnosis
+    # a law that needs more names than the one of the rig file is no better
+    most = min(max(1, names_open(answer)), fit_problem.settings.most_terms)
+    settings = replace(fit_problem.settings, most_terms=most)
 
     def divided(rig: Rig) -> tuple[Problem, Problem, list[Unjudged]]:
-        fitted, held_out, unjudged, _ = _problems(
-            case.with_rig(rig), fit_problem.settings, considered
-        )
+        fitted, held_out, unjudged, _ = _problems(case.with_rig(rig), settings, considered)
         return *_with_offsets(fitted, held_out, rig)[:2], unjudged
 
-    best, silent = stated, Steps(None, within=_JUDGED)
-    for choice, recordings in promising_laws(case.rig, fit_problem, stated, divided):
+    best = stated
+    for choice, recordings in promising_laws(case.rig, fit_problem, answer, divided):
+        law = f"with {choice.name} = {choice.other}: "
+        tell = Steps(partial(_say_with, law, say), within=(_JUDGED[1], 1.0))
         with suppress(PamrsError):  # a rig that these recordings cannot be of
-            other, _, _ = _diagnosis_in_units_said(case.with_rig(choice.rig), *recordings, silent)
-            best = under(choice, other, stated) if is_better(other, best) else best
+            other = _answered(case.with_rig(choice.rig), *recordings, tell)
+            if is_better(other.diagnosis, best.diagnosis):
+                found = replace(other.diagnosis, settings=answer.settings)
+                best = replace(other, diagnosis=under(choice, found, answer))
     return best
+
+
+def _say_with(law: str, say: Steps, line: str) -> None:
+    """Pass on a line about the diagnosis under another law."""
+    say(law + line, line.share if isinstance(line, Line) else None)
 
 
 def _missing(

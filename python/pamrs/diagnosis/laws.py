@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from pamrs.diagnosis.fit import Fit, Problem, fit
@@ -41,6 +42,7 @@ def promising_laws(
         The recordings under another rig.
     """
     suspects = {part.block for part in stated_diagnosis.answer.parts}
+    answered = stated_diagnosis.rig if isinstance(stated_diagnosis.rig, Rig) else rig
     for mechanical in (False, True):
         blocks = [b for b in problem.blocks if b.mechanical == mechanical]
         if not any(b.name in suspects for b in blocks):
@@ -57,11 +59,23 @@ def promising_laws(
                 continue  # a rig that these recordings cannot be of
             if missed < least:
                 best, least = (choice, divided), missed
-        # only the one that is left is refitted to its end
-        if best is not None and _missed(best[0].rig, best[1][0], names) < CLEARLY_LESS * _missed(
-            rig, problem, names
-        ):
-            yield best
+        if best is None:
+            continue
+        with suppress(PamrsError):  # only the one that is left is refitted to its end
+            missed = _missed(best[0].rig, best[1][0], names)
+            if missed < CLEARLY_LESS * _missed(rig, problem, names) and (
+                _can_be_beaten(stated_diagnosis)
+                or missed < AS_LARGE**2 * _missed(answered, problem, names)
+            ):
+                yield best
+
+
+def _can_be_beaten(stated: Diagnosis) -> bool:
+    """True where an answer under another law could leave clearly less than this one, or have fewer
+    names and still one: else only a law that needs none is better.
+    """
+    before = _noises(stated.proven, [m.channel for m in _mismatches(stated)])
+    return CLEARLY_LESS * before**2 > 1.0 or names_open(stated) > 1
 
 
 def _is_an_effect(choice: OtherChoice) -> bool:
@@ -100,9 +114,15 @@ def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
         return False
     channels = [m.channel for m in _mismatches(stated)]
     now, before = (_noises(d.proven, channels) for d in (other, stated))
-    # a block whose values lie where they hardly can is as much in question as one with a name
-    open_to, was = (max(len(d.answer.named), len(d.answer.parts)) for d in (other, stated))
-    return now**2 < CLEARLY_LESS * before**2 or (open_to < was and now < AS_LARGE * before)
+    fewer = names_open(other) < names_open(stated)
+    return now**2 < CLEARLY_LESS * before**2 or (fewer and now < AS_LARGE * before)
+
+
+def names_open(diagnosis: Diagnosis) -> int:
+    """Count of what an answer names; a block whose values lie where they hardly can is as much in
+    question as one with a name.
+    """
+    return max(len(diagnosis.answer.named), len(diagnosis.answer.parts))
 
 
 def _mismatches(diagnosis: Diagnosis) -> list[BlockMismatch]:

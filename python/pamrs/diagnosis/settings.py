@@ -222,7 +222,7 @@ class DiagnosisSettings:
         5, "count", "single effects that are fitted", "docs/decisions/0013", least=1
     )
     most_terms: int = _setting(
-        5, "count", "effects of a set", "judgement: more have no proof", least=2
+        5, "count", "effects of a set", "judgement: more have no proof", least=1
     )
     most_polished: int = _setting(
         4,

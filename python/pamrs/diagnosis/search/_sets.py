@@ -100,7 +100,7 @@ def combine(
 
     The best of the single ones get a partner: another effect, or a value that is wrong. The best of
     these sets grows, one term after the other, as long as held-out recordings are clearly predicted
-    better.
+    better. No set has more terms than the settings allow.
 
     Parameters
     ----------
@@ -111,6 +111,8 @@ def combine(
     transient : list of Term
         Effects that happen at times of their own.
     """
+    if search.attempts.settings.most_terms < 2:
+        return []
     roots = search.heaviest_first(c for c in (*singles, *wrong_values) if c.fit.events is None)
     growing = _Growing(search, roots)
     sets = [s for root in roots[:BEAM] for s in growing.widen(root)]
