@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 
-def _beginning(names: Iterable[str], incomplete: str) -> list[str]:
-    return [name for name in names if name.startswith(incomplete)]
+def beginning(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """Completion by those of some names that begin with a text."""
+    return lambda incomplete: [name for name in names() if name.startswith(incomplete)]
 
 
-def effect_ids(incomplete: str) -> list[str]:
-    """Ids of effects that begin with a text."""
+def effect_ids() -> Iterable[str]:
+    """Ids of all effects."""
     from pamrs.effects import CATALOGUE
 
-    return _beginning(CATALOGUE, incomplete)
-
-
-def muscle_names(incomplete: str) -> list[str]:
-    """Names of muscles of the library that begin with a text."""
-    from pamrs import library
-
-    return _beginning(library.names(), incomplete)
-
-
-def rig_names(incomplete: str) -> list[str]:
-    """Names of rigs of the package that begin with a text."""
-    from pamrs import rigs
-
-    return _beginning(rigs.names(), incomplete)
+    return CATALOGUE

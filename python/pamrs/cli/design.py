@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from pamrs import library
 from pamrs._checks import refused
 from pamrs._writing import check_writable
 from pamrs.cli._shared import (
@@ -20,7 +21,7 @@ from pamrs.cli._shared import (
     named_muscle,
     write,
 )
-from pamrs.cli.completion import muscle_names
+from pamrs.cli.completion import beginning
 from pamrs.units import bar_and_psi
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def _joint(
         str,
         typer.Option(
             help="A muscle of the library, or a rig file (TOML) with one.",
-            autocompletion=muscle_names,
+            autocompletion=beginning(library.names),
         ),
     ],
     count: Annotated[int, typer.Option(help="Muscles in parallel.")],

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from pamrs.cli.completion import effect_ids
+from pamrs.cli.completion import beginning, effect_ids
 
 
 def effects_command(
@@ -15,7 +15,7 @@ def effects_command(
         typer.Argument(
             metavar="ID",
             help="An effect of the catalogue; without it, all are listed.",
-            autocompletion=effect_ids,
+            autocompletion=beginning(effect_ids),
         ),
     ] = None,
 ) -> None:

@@ -11,7 +11,7 @@ from pamrs import rigs
 from pamrs._files import resolved
 from pamrs._writing import write_atomically
 from pamrs.cli._shared import RigName, check_new, rig_named
-from pamrs.cli.completion import rig_names
+from pamrs.cli.completion import beginning
 from pamrs.units import from_si, with_unit
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def _rig_new(
         str,
         typer.Option(
             help=f"Rig of the package to begin with: {', '.join(rigs.names())}.",
-            autocompletion=rig_names,
+            autocompletion=beginning(rigs.names),
         ),
     ] = "shoulder",
     name: Annotated[

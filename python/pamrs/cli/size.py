@@ -22,7 +22,7 @@ from pamrs.cli._shared import (
     naming,
     write,
 )
-from pamrs.cli.completion import muscle_names
+from pamrs.cli.completion import beginning
 from pamrs.errors import ParameterError
 from pamrs.units import same_dimension
 
@@ -46,7 +46,7 @@ def size_command(
         list[str] | None,
         typer.Argument(
             help="Names of the library (all by default), or rig files with --pressure.",
-            autocompletion=muscle_names,
+            autocompletion=beginning(library.names),
         ),
     ] = None,
     pressure: Annotated[

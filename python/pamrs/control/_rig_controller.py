@@ -216,7 +216,7 @@ class RigController(SampledController):
                     f"the joint has {len(torques)}"
                 )
             return given
-        if self.model.opposed(joint):
+        if len({torque.sign for torque in torques}) > 1:  # muscles on both sides
             return CoContraction(torques, limit, stiffness=stiffness)
         if stiffness is not None:
             raise ParameterError(

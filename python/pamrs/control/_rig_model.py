@@ -98,10 +98,6 @@ class RigModel:
         """The torque of each of them."""
         return tuple(self._torques[group.chamber] for group in self.of_joint(joint))
 
-    def opposed(self, joint: str) -> bool:
-        """True where muscles on both sides turn a joint."""
-        return len({torque.sign for torque in self.torques_of(joint)}) > 1
-
     def pressure_loop(
         self, chamber: str, *, period: float, crossover: float = _CROSSOVER
     ) -> PressureLoop:

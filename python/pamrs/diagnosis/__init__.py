@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from pamrs._progress import Line, Steps
+from pamrs._progress import Steps
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.evidence import BlockGroup, odds_of_unseen
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
@@ -497,18 +497,13 @@ def _under_best_law(
     best = stated
     for choice, recordings in promising_laws(case.rig, fit_problem, answer, divided):
         law = f"with {choice.name} = {choice.other}: "
-        tell = Steps(partial(_say_with, law, say), within=(_JUDGED[1], 1.0))
+        tell = Steps(lambda line, law=law: say(law + line))  # type: ignore[misc]
         with suppress(PamrsError):  # a rig that these recordings cannot be of
             other = _answered(case.with_rig(choice.rig), *recordings, tell)
             if is_better(other.diagnosis, best.diagnosis):
                 found = replace(other.diagnosis, settings=answer.settings)
                 best = replace(other, diagnosis=under(choice, found, answer))
     return best
-
-
-def _say_with(law: str, say: Steps, line: str) -> None:
-    """Pass on a line about the diagnosis under another law."""
-    say(law + line, line.share if isinstance(line, Line) else None)
 
 
 def _missing(
@@ -647,11 +642,12 @@ def missing_input(
 def _judged_only(
     fit_problem: Problem, held_out_problem: Problem, groups: list[BlockGroup]
 ) -> tuple[Problem, Problem]:
-    """Recordings without the blocks whose judgement failed."""
-    judged = {block.name for group in groups for block in group.blocks}
+    """Recordings without the blocks whose judgement failed, the others with windows as judged."""
+    judged = {block.name: block for group in groups for block in group.blocks}
     if not judged:
         raise DiagnosisError("; ".join(fit_problem.losses.sentences))
-    fitted = replace(fit_problem, blocks=[b for b in fit_problem.blocks if b.name in judged])
+    kept = [judged[b.name] for b in fit_problem.blocks if b.name in judged]
+    fitted = replace(fit_problem, blocks=kept)
     same, blocks = held_out_problem is fit_problem, fitted.blocks
     return fitted, fitted if same else replace(held_out_problem, blocks=blocks)
 

@@ -41,8 +41,9 @@ def promising_laws(
     prepared : callable
         The recordings under another rig.
     """
-    suspects = {part.block for part in stated_diagnosis.answer.parts}
-    answered = stated_diagnosis.rig if isinstance(stated_diagnosis.rig, Rig) else rig
+    suspects, found = {part.block for part in stated_diagnosis.answer.parts}, stated_diagnosis.rig
+    # after the few evaluations of a first fit
+    briefly = lambda part, rig, inflation: fit(part, rig, (), {}, inflation)  # noqa: E731
     for mechanical in (False, True):
         blocks = [b for b in problem.blocks if b.mechanical == mechanical]
         if not any(b.name in suspects for b in blocks):
@@ -54,7 +55,7 @@ def promising_laws(
                 continue
             try:
                 divided = prepared(choice.rig)
-                missed = _missed(choice.rig, divided[0], names, _fit_briefly)
+                missed = _missed(choice.rig, divided[0], names, briefly)
             except PamrsError:
                 continue  # a rig that these recordings cannot be of
             if missed < least:
@@ -65,7 +66,8 @@ def promising_laws(
             missed = _missed(best[0].rig, best[1][0], names)
             if missed < CLEARLY_LESS * _missed(rig, problem, names) and (
                 _can_be_beaten(stated_diagnosis)
-                or missed < AS_LARGE**2 * _missed(answered, problem, names)
+                or missed
+                < AS_LARGE**2 * _missed(found if isinstance(found, Rig) else rig, problem, names)
             ):
                 yield best
 
@@ -83,11 +85,6 @@ def _is_an_effect(choice: OtherChoice) -> bool:
     kind = choice.name.partition(".")[0]
     own = (effect for effect in EFFECTS.values() if effect.block == kind)
     return any(form.name == choice.other for effect in own for form in effect.forms)
-
-
-def _fit_briefly(problem: Problem, rig: Rig, inflation: dict[str, float]) -> Fit:
-    """Baseline of a rig after the few evaluations of a first fit."""
-    return fit(problem, rig, (), {}, inflation)
 
 
 def _missed(
@@ -114,8 +111,9 @@ def is_better(other: Diagnosis, stated: Diagnosis) -> bool:
         return False
     channels = [m.channel for m in _mismatches(stated)]
     now, before = (_noises(d.proven, channels) for d in (other, stated))
-    fewer = names_open(other) < names_open(stated)
-    return now**2 < CLEARLY_LESS * before**2 or (fewer and now < AS_LARGE * before)
+    return now**2 < CLEARLY_LESS * before**2 or (
+        names_open(other) < names_open(stated) and now < AS_LARGE * before
+    )
 
 
 def names_open(diagnosis: Diagnosis) -> int:

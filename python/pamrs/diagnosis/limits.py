@@ -289,7 +289,7 @@ class Limits:
             distance=distance,
             rival=str(self._labels[rival]),
         )
-        if not start.scalable:
+        if not start.sizes:
             return named
         leading = start.sizes[0]
         return replace(

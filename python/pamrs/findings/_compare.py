@@ -164,16 +164,13 @@ def _changed(compared: Compared, first: Mapping[str, Any], second: Mapping[str, 
     for key in ("inputs", "settings", "version"):
         one, other = first.get(key), second.get(key)
         if one != other and one is not None and other is not None:
-            sentences.append(
-                f"version {one} and {other}" if key == "version" else _differ(key, one, other)
+            names = (
+                [f"{one} and {other}"]
+                if key == "version"
+                else sorted(n for n in {*one, *other} if one.get(n) != other.get(n))
             )
+            sentences.append(f"{key}{' differ:' * (key != 'version')} {', '.join(names)}")
     return sentences
-
-
-def _differ(what: str, one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
-    """Sentence with the entries in which two tables differ."""
-    names = sorted(name for name in {*one, *other} if one.get(name) != other.get(name))
-    return f"{what} differ: {', '.join(names)}"
 
 
 def _term(effect: Mapping[str, Any]) -> str:

@@ -497,7 +497,9 @@ def unit_of_stamps(values: Array, name: str, said: str = "") -> tuple[str, str]:
     steps = steps[steps > 0.0]
     usual = float(np.median(steps)) if len(steps) else 0.0
     size = float(np.max(np.abs(good))) if len(good) else 0.0
-    spoken = TIME_UNITS.get(_last_word(name), "")
+    parted = re.sub(r"(?<=[a-zäöü])(?=[A-Z])", " ", name).lower()
+    words = ["", *(word for word in re.split(r"[^0-9a-zäöüµ]+", parted) if word)]
+    spoken = TIME_UNITS.get(words[-1], "")
     for unit in (said, spoken):
         if unit and size * parse_unit(unit).scale <= _LONGEST:
             return unit, "" if unit == said else f"the times {name} are taken as {unit} by name"
@@ -507,12 +509,6 @@ def unit_of_stamps(values: Array, name: str, said: str = "") -> tuple[str, str]:
     if said or spoken:
         why = f"reach {size:.4g}, which cannot be {said or spoken}: {unit} is taken"
     return unit, f"the times {name} {why}, samples are then {apart:.4g} s apart"
-
-
-def _last_word(name: str) -> str:
-    parted = re.sub(r"(?<=[a-zäöü])(?=[A-Z])", " ", name)
-    words = [word for word in re.split(r"[^0-9a-zäöüµ]+", parted.lower()) if word]
-    return words[-1] if words else ""
 
 
 def _by_size(size: float, usual: float) -> str:

@@ -273,7 +273,8 @@ def _stated_pressure(series: Sequence[Series]) -> str:
 
 def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | Open:
     channel, written = channel_of(name), understood_unit(series.unit)
-    usual = _usual_unit(channel)
+    si = CHANNELS[channel].unit
+    usual = {"Pa": "bar", "rad": "deg", "m": "mm", "N m": "Nm"}.get(si, si)
     if written is not None and _measures(written, channel):
         absolute = written.absolute
         if absolute is None and same_dimension(written.unit, "Pa"):
@@ -332,11 +333,6 @@ _VOLTAGES: Final = (
 _ABSOLUTE: Final = frozenset(("abs", "absolute", "absolut"))
 _READINGS: Final[dict[str, tuple[float, ...]]] = {"A": (4.0, 20.0), "V": (0.0, 10.0)}
 """Signals of usual transmitters, from the lower end of their range to the upper one."""
-
-
-def _usual_unit(channel: str) -> str:
-    usual = {"Pa": "bar", "rad": "deg", "m": "mm", "N m": "Nm"}
-    return usual.get(CHANNELS[channel].unit, CHANNELS[channel].unit)
 
 
 def _measures(written: Written, channel: str) -> bool:

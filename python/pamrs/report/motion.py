@@ -86,7 +86,11 @@ def write_channels(
     moving = [
         panel
         for panel in there
-        if any(_tells(result, name) or _recorded(name, given) for name in panel[1])
+        if any(
+            float(np.ptp(result[name])) > 1e-9 * max(float(np.abs(result[name]).max()), 1e-12)
+            or _recorded(name, given)
+            for name in panel[1]
+        )
     ] or there
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 1.0 + 1.75 * len(moving)), dpi=110, layout="constrained")
@@ -176,11 +180,6 @@ def _recorded(name: str, given: Mapping[str, Any]) -> str:
 def _label(name: str, several: bool) -> str:
     head, _, block = name.partition(".")
     return " ".join(part for part in (_NAMES.get(head, "") if several else "", block) if part)
-
-
-def _tells(result: Simulation, name: str) -> bool:
-    """True where a simulated channel moves at all."""
-    return float(np.ptp(result[name])) > 1e-9 * max(float(np.abs(result[name]).max()), 1e-12)
 
 
 def write_animation(
@@ -296,7 +295,8 @@ class _Scene:
         span = low, max(float(pressures.max()), low + 1.0)
         joints = list(result.under("joint_angle"))
         self.groups = [_Muscles(axes, result, name, scale, span) for name in groups]
-        self.at = [self._joint_of(name, joints) for name in groups]
+        moved = (result.rig.ports("muscle")[name]["joint"] for name in groups)
+        self.at = [0 if one == "load" else joints.index(one.partition(".")[2]) for one in moved]
         fixed = (
             ([0.0, 0.0], [0.0, top])
             if self.angles
@@ -315,10 +315,6 @@ class _Scene:
         self.base = np.array([0.0, 0.0])
         self.tilt = sum(float(arm.get("base_angle", 0.0)) for arm in rig.tables("arm").values())
         self.top = top
-
-    def _joint_of(self, name: str, joints: list[str]) -> int:
-        joint = self.result.rig.ports("muscle")[name]["joint"]
-        return joints.index(joint.partition(".")[2]) if joint != "load" else 0
 
     def draw(self, row: int) -> tuple[Any, ...]:
         """Put one sample into the picture."""

@@ -70,6 +70,8 @@ def limit_lines(model: Mapping[str, Any]) -> list[str]:
 
 def effect_lines(content: Content, effect: Mapping[str, Any]) -> list[str]:
     """One table ``[[effects]]`` as lines of TOML."""
+    from pamrs.effects import EFFECTS
+
     place = effect.get("at", "")
     lines = [
         "",
@@ -79,7 +81,8 @@ def effect_lines(content: Content, effect: Mapping[str, Any]) -> list[str]:
         *([f"form = {_text(effect['form'])}"] if "form" in effect else []),
         "[effects.parameters]",
     ]
-    units = _effect_units(effect["id"], effect.get("form", ""))
+    parameters = EFFECTS[effect["id"]].form(effect.get("form", "")).parameters
+    units = {parameter.name: parameter.unit for parameter in parameters}
     full = qualified(effect["id"], place)
     spread = content.effect_std.get(full, {})
     for name, value in effect["parameters"].items():
@@ -131,12 +134,6 @@ def entry_text(key: Key, value: Any, tol: float, *, own: bool = False) -> str:
     if key.path and not note:
         return _number(value)
     return f"{{ value = {_number(value)}, unit = {_text(key.unit)}{note} }}"
-
-
-def _effect_units(effect: str, form: str) -> dict[str, str]:
-    from pamrs.effects import EFFECTS
-
-    return {parameter.name: parameter.unit for parameter in EFFECTS[effect].form(form).parameters}
 
 
 def _text(value: str) -> str:

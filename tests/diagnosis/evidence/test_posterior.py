@@ -240,7 +240,9 @@ def test_a_wrong_value_is_told_from_one_inside_its_tolerances(std: float, *, nam
     assert (weighed(wrong).get(MODULUS, 0.0) > 0.5) == named
 
 
-def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
+def test_effects_that_come_to_nothing_are_not_fitted_further(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Three effects of two starts each: only that with a size gets its other start."""
     asked: list[tuple[str, float]] = []
     keys = {**CREEP, **DAMPING, "external_torque": {"torque": (5.0, 0.1)}}
@@ -255,7 +257,9 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
     attempts = SimpleNamespace(
         settings=SETTINGS,
         fit_shortly=shortly,
-        start_of=lambda fit, effect: Start(effect, {}, {}, (), False),
+    )
+    monkeypatch.setattr(
+        _hypotheses, "start_of", lambda fit, effect: Start(effect, {}, {}, (), False)
     )
     search = SimpleNamespace(
         attempts=attempts, start=hypothesis({}, 1.0), weight=lambda candidate: candidate.misfit
@@ -269,8 +273,9 @@ def test_effects_that_come_to_nothing_are_not_fitted_further() -> None:
     }
     found, _, _ = _hypotheses._shortlist(search, [[term] for term in ranked], ranked)
     assert [term.id for term in found] == ["muscle_rate_damping"]
-    every = [*((effect, 1.0) for effect in keys), ("muscle_rate_damping", 2.0)]
-    assert sorted(asked) == sorted(every)
+    assert sorted(asked) == sorted(
+        [*((effect, 1.0) for effect in keys), ("muscle_rate_damping", 2.0)]
+    )
 
 
 @pytest.mark.parametrize(

@@ -320,7 +320,8 @@ def joint_posteriors(
     several = sorted({t for one, two in itertools.combinations(named, 2) for t in one & two})
     fitted = [{c.hypothesis: c for c in group.candidates} for group in groups]
     for choice in itertools.product(*(p.items() for p in alone)):
-        if not _possible_together(terms_of(h for h, _ in choice)):
+        effects = [term for term in terms_of(h for h, _ in choice) if term.is_effect]
+        if any(one.excluded_by(effects[k + 1 :]) for k, one in enumerate(effects)):
             continue  # one effect everywhere and at a place of its own
         weight = math.prod(p for _, p in choice)
         for term in several:
@@ -381,12 +382,6 @@ def are_alike(first: float, second: float, std: float) -> bool:
     """True where two values differ by at most three standard deviations, or half of the larger."""
     known = NOISE_STDS * std, _ALIKE_SHARE * max(abs(first), abs(second))
     return abs(first - second) <= max(known)
-
-
-def _possible_together(terms: Sequence[Term]) -> bool:
-    """True where no effect among the terms of several groups excludes another."""
-    effects = [term for term in terms if term.is_effect]
-    return not any(one.excluded_by(effects[k + 1 :]) for k, one in enumerate(effects))
 
 
 def normalised(weights: dict[Hypothesis, float]) -> dict[Hypothesis, float]:

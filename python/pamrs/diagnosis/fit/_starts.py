@@ -43,11 +43,6 @@ class Start:
     form: str = ""
 
     @property
-    def scalable(self) -> bool:
-        """True where the effect has sizes that a factor scales."""
-        return bool(self.sizes)
-
-    @property
     def kind(self) -> tuple[str, frozenset[tuple[str, float]]]:
         """Form of the start, and its fixed parameters."""
         return self.form, frozenset(self.fixed.items())

@@ -116,15 +116,11 @@ def _hats(x: Array) -> Array:
     return np.stack([np.interp(x, knots, row) for row in np.eye(knots.size)], axis=1)
 
 
-def _direction(rate: Array) -> Array:
-    """Sign of a rate, smooth where it turns."""
-    fastest = max(float(np.quantile(np.abs(rate), 0.95)), 1e-300)
-    return np.tanh(rate / (_TURN * fastest))
-
-
 def _candidates(along: _JoinedInput, position: str, rate: str) -> dict[str, Array]:
     """Columns of a function of each argument, the simplest first."""
-    direction = _direction(along.arguments[rate])
+    fastest = max(float(np.quantile(np.abs(along.arguments[rate]), 0.95)), 1e-300)
+    # the sign of the rate, smooth where it turns
+    direction = np.tanh(along.arguments[rate] / (_TURN * fastest))
     columns = {"": np.ones((along.value.size, 1))}
     columns[rate] = direction[:, None] * _hats(np.abs(along.arguments[rate]))
     columns |= {n: _hats(x) for n, x in along.arguments.items() if n not in (rate, "time")}

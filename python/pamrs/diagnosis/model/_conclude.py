@@ -377,7 +377,11 @@ def _models(nominal: Rig, fit_problem: Problem, judged: list[Judged], verdict: s
             final,
             verdict,
         )
-    wanted = [_model_of(j, start) for j, start in zip(judged, refitted, strict=True)]
+    # what is named, with a form of what has no name
+    wanted = [
+        j.form or (j.chosen if j.named or j.wrong else start)
+        for j, start in zip(judged, refitted, strict=True)
+    ]
     settled = _with_common_zeros(nominal, fit_problem, judged, wanted)
     chosen = _with_stated_stds(fit_problem, judged, settled)
     judged = [
@@ -410,11 +414,6 @@ def _known(models: Models) -> KnownValues:
     parts.append(np.diag([of_file[n].tol for n in rest]))
     values += [of_file[n].value for n in rest]
     return KnownValues((*names, *rest), np.array(values), block_diag(*parts))
-
-
-def _model_of(judged: Judged, start: FittedHypothesis) -> FittedHypothesis:
-    """Candidate of a group for the model: what is named, with a form of what has no name."""
-    return judged.form or (judged.chosen if judged.named or judged.wrong else start)
 
 
 def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:

@@ -8,6 +8,8 @@ from pamrs.diagnosis.prepare._beginning import (
     with_unjudged_starts,
 )
 from pamrs.diagnosis.prepare._blocks import (
+    ARM_WINDOW,
+    OFTEN_WINDOW,
     Block,
     Input,
     Unjudged,
@@ -64,9 +66,11 @@ from pamrs.diagnosis.prepare._signals import (
 )
 
 __all__ = [
+    "ARM_WINDOW",
     "AS_LARGE",
     "CLEARLY_LESS",
     "NOISE_STDS",
+    "OFTEN_WINDOW",
     "ROUNDING",
     "averaged",
     "averaged_to_need",

@@ -26,6 +26,8 @@ from pamrs.rig.schema import keys_of, qualified
 
 # [s] a joint's windows: its start has faded, a wrong break-away spoils no more (decision 14)
 ARM_WINDOW = 2.5
+# [s] the same where nothing is named on these: less than the period of an arm (decision 14)
+OFTEN_WINDOW = 0.3
 SUPPLY_WINDOW = 4.0  # [s] windows of a tank or a regulator
 _CHAMBER_WINDOW = 2.0  # [s] windows of a chamber that is fed; a sealed one is one window
 _LEAST_PRESSURE_SHARE = 0.01  # share of the ambient pressure that a noisy gauge shows at the least
@@ -326,7 +328,9 @@ class _BlockMap:
             | self.moved("chamber", *map(block_of, hidden))
         )
         for node in air:
-            names |= self.of_paths(node) | self.zeros(self.nodes_at(node), joints)
+            paths = [name for path in self.around(node) for name in (path.name, *path.between)]
+            of_paths = {n for name in paths for n in self.moved(channel_of(name), block_of(name))}
+            names |= of_paths | self.zeros(self.nodes_at(node), joints)
         return replace(
             block,
             drives=drives,
@@ -439,11 +443,6 @@ class _BlockMap:
         named = set(joints)
         pulling = [m for m, joint in self.joint_of.items() if joint in named]
         return self.of("joint", *named) | self.of("transmission", *pulling)
-
-    def of_paths(self, block: str) -> set[str]:
-        """Parameters of the valves and lines at a block."""
-        full = [name for path in self.around(block) for name in (path.name, *path.between)]
-        return {one for name in full for one in self.moved(channel_of(name), block_of(name))}
 
     def tubes_at(self, block: str) -> tuple[Tube, ...]:
         """The tubes of segments among the flow paths at a block."""

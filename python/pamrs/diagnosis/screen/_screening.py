@@ -168,7 +168,7 @@ def _best_size(along: float, power: float, start: Start) -> tuple[float, float]:
     if power < ROUNDING:
         return 0.0, 0.0
     low = -_MOST_LINEAR if start.signed else _LEAST_SIGNATURE_SIZE
-    size = float(np.clip(-along / power, low, _MOST_LINEAR)) if start.scalable else 1.0
+    size = float(np.clip(-along / power, low, _MOST_LINEAR)) if start.sizes else 1.0
     return size, -2.0 * size * along - size**2 * power
 
 
@@ -322,7 +322,7 @@ class _SignatureSearch:
             if (
                 score is None
                 or score.gain <= 0.0
-                or not start.scalable
+                or not start.sizes
                 or _REPEAT_BELOW <= abs(score.size) < _MOST_LINEAR
             ):
                 break
@@ -332,7 +332,7 @@ class _SignatureSearch:
             if wanted == start_tried:
                 break  # its bounds hold it
             start_tried = wanted
-        if self.strong and start.scalable and most is None and everywhere is None:
+        if self.strong and start.sizes and most is None and everywhere is None:
             others = [self._signature_of(start.scaled(size)) for size in STRONG_SIZES]
             # what a signature says of other sizes than its own is not relied on
             known = [shown for shown in (best, *others) if shown is not None]

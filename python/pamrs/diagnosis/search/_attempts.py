@@ -150,13 +150,9 @@ class Attempts:
         """Inflation by the autocorrelation that a fit leaves, at the least that of the noise."""
         return inflation_of(self.fit_problem, fitted, self.noise_level)
 
-    def start_of(self, fitted: Fit, effect: Term) -> Start:
-        """Start of another fit from an effect as it was fitted."""
-        return start_of(fitted, effect)
-
     def starts_of(self, candidate: FittedHypothesis) -> list[Start]:
         """Starts of another fit from each effect of a candidate."""
-        return [self.start_of(candidate.fit, effect) for effect in candidate.effects]
+        return [start_of(candidate.fit, effect) for effect in candidate.effects]
 
     def fit_events(self, effect: Term, candidate: FittedHypothesis) -> FittedHypothesis | None:
         """Fit an effect with times of its own in every recording, next to a candidate's effects."""
@@ -350,7 +346,7 @@ class Attempts:
             best = self._fit(starts, inflation, warm, evaluations=limit)
             inflation_left = self.inflation_of(best)
             if inflation_left.largest > CORRELATED_VARIANCE:
-                again = [self.start_of(best, effect) for effect in effects]
+                again = [start_of(best, effect) for effect in effects]
                 best = self._fit(again, inflation_left, best, evaluations=limit)
             return self.assess(effects, best)
 
@@ -539,7 +535,7 @@ class Attempts:
                 break  # it leaves not much less than it was inflated by
             inflation, starts = (
                 inflation_left,
-                [self.start_of(fitted, effect) for effect in effects],
+                [start_of(fitted, effect) for effect in effects],
             )
         return replace(self.assess(effects, fitted), wrong=wrong)
 

@@ -58,9 +58,5 @@ def _possible_starts(search: Search, base: FittedHypothesis, effect: Term) -> li
     usual = starts_of(effect, sealed=search.attempts.nominal.model["valve"] is None)
     return [
         *(score.start.scaled(score.size) for score in ranked.get(effect, [])),
-        *(
-            one.scaled(s)
-            for one in usual
-            for s in ((1.0, *STRONG_SIZES) if one.scalable else (1.0,))
-        ),
+        *(one.scaled(s) for one in usual for s in ((1.0, *STRONG_SIZES) if one.sizes else (1.0,))),
     ]

@@ -28,7 +28,7 @@ from pamrs.diagnosis.evidence import (
     significant,
 )
 from pamrs.diagnosis.fit import Problem, Start, acts_in, concerns
-from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.prepare import ARM_WINDOW, OFTEN_WINDOW, Block
 from pamrs.diagnosis.screen import by_effect
 from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._baseline import (
@@ -110,7 +110,8 @@ def examine(
             return []
         others = [p for p in examined if isinstance(p, Mismatch) and p is not part]
         # where only noise is left nothing parts the names that are open elsewhere
-        sure = others if isinstance(part, Mismatch) else [p for p in others if p.is_settled]
+        least = 0.0 if isinstance(part, Mismatch) else fit_problem.settings.settled
+        sure = [p for p in others if max(p.weighed.values()) > least]
         blocks = part.refit.attempts.suspects if isinstance(part, Mismatch) else part.group.blocks
         starts = [s for p in sure for s in p.leading if any(acts_in(s.effect, b) for b in blocks)]
         names = " and ".join(b.name for b in part.refit.attempts.fit_problem.blocks)
@@ -172,7 +173,10 @@ def _begin_part(
             tell("one baseline leaves noise in all recordings")
             return OnlyNoise(refit, healthy_group(refit, common), tell)
     if refit.attempts.suspects:
-        return _fit_hypotheses(refit, tell)
+        found = _fit_hypotheses(refit, tell)
+        what = "the search with more starts of the motion"
+        often = partial(_begun_often, found, fit_problem, held_out_problem, nominal, tell)
+        return fit_problem.losses.part(what, often, found)
     return OnlyNoise(refit, refit.group([refit.start], {UNDECIDED: 1.0}, None), tell)
 
 
@@ -208,6 +212,31 @@ def _fit_hypotheses(refit: Refit, tell: Say) -> Mismatch:
     return Mismatch(refit, state.mismatch, state.search, candidates, weighed)
 
 
+def _begun_often(
+    found: Mismatch, fit_problem: Problem, held_out_problem: Problem, nominal: Rig, tell: Say
+) -> Mismatch:
+    """Mismatch of a motion on windows that begin more often, where that gets a name and the usual
+    windows give it none.
+
+    What a model cannot follow, as an arm that sticks, grows inside a window until its sum of
+    squares has minima everywhere; the shorter the window, the smoother (Ribeiro et al., On the
+    smoothness of nonlinear system identification, Automatica 121, 2020).
+    """
+    if not found.block.mechanical or _leading(found.weighed) != UNLISTED:
+        return found
+    tell(f"nothing named on windows of {ARM_WINDOW:g} s: trying windows of {OFTEN_WINDOW:g} s")
+    blocks = [
+        b if b.window is None else replace(b, window=OFTEN_WINDOW) for b in fit_problem.blocks
+    ]
+    often = refit_blocks(
+        replace(fit_problem, blocks=blocks), replace(held_out_problem, blocks=blocks), nominal
+    )
+    if not often.attempts.suspects:
+        return found
+    again = _fit_hypotheses(often, tell)
+    return again if _leading(again.weighed).terms else found
+
+
 @dataclass(frozen=True, eq=False)
 class Mismatch:
     """Excess that some blocks keep after the refit, with the hypotheses tried for it.
@@ -231,11 +260,6 @@ class Mismatch:
     search: Search
     candidates: list[FittedHypothesis]
     weighed: dict[Hypothesis, float]
-
-    @property
-    def is_settled(self) -> bool:
-        """True where one hypothesis is so probable that no other is left open."""
-        return max(self.weighed.values()) > self.refit.attempts.settings.settled
 
     @property
     def leading(self) -> list[Start]:

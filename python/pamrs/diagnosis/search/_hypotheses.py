@@ -19,7 +19,16 @@ from pamrs.diagnosis.evidence import (
     probability_cap,
     same_recordings,
 )
-from pamrs.diagnosis.fit import Fit, Start, acts_in, fits, form_in, same_data_in, two_at_a_time
+from pamrs.diagnosis.fit import (
+    Fit,
+    Start,
+    acts_in,
+    fits,
+    form_in,
+    same_data_in,
+    start_of,
+    two_at_a_time,
+)
 from pamrs.diagnosis.noise import LEAST_SIZE
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, best_of_each_kind, by_effect, screen
@@ -381,7 +390,7 @@ def _shortlist(
             forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
             best_forms = sorted(forms.values(), key=weight, reverse=True)
             count = _MOST_FORMS if leads else 1
-            starts[effect] = [attempts.start_of(c.fit, effect) for c in best_forms[:count]]
+            starts[effect] = [start_of(c.fit, effect) for c in best_forms[:count]]
             ends |= {(effect, form_in(c.fit.rig, effect)): c for c in best_forms[:count]}
             best.append(effect)
     return best, starts, ends
@@ -459,7 +468,7 @@ def _in_shape(search: Search, single: FittedHypothesis, same: SameData) -> Fitte
     in it.
     """
     attempts = search.attempts
-    start = attempts.start_of(single.fit, single.effects[0])
+    start = start_of(single.fit, single.effects[0])
     fixed = {f"{start.effect}.{name}": value for name, value in same.held}
     if all(start.fixed[name] == value for name, value in fixed.items()):
         return single

@@ -25,7 +25,6 @@ from pamrs._arrays import Array
 from pamrs.channels import block_of, channel_of, unit_of
 from pamrs.diagnosis.fit import (
     Fit,
-    Key,
     Problem,
     free_baseline,
     known_parameters,
@@ -33,7 +32,6 @@ from pamrs.diagnosis.fit import (
     stacked,
 )
 from pamrs.diagnosis.noise import (
-    NoiseLevel,
     correlation_time,
     excess,
     inflation_of,
@@ -234,7 +232,12 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
         now = thorough(reread, nominal, no_inflation(problem.blocks), was)
         before, after = _power(problem, was), _power(reread, now)
         levels, least = noise_levels(reread, core_rig(now.rig)), 0.5 * _CLEAR_STDS**2
-        if was.cost - now.cost < least * max(1.0, after) or not _is_noise(reread, now, levels):
+        left = (
+            excess(b, reread.recordings, now.residuals, levels, reread.settings)
+            for b in reread.blocks
+        )
+        excessive = any(one.ratio > one.limit for one in left)
+        if was.cost - now.cost < least * max(1.0, after) or excessive:
             return None
         inflation = inflation_of(reread, now, levels)
         none, listed, far = (
@@ -258,15 +261,6 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
         return None
     fits = replace(reading, before=before, after=after, fit=now, was=was)
     return replace(fits, gain=gain, std=gain * abs(step) * std)
-
-
-def _is_noise(problem: Problem, fitted: Fit, levels: dict[Key, NoiseLevel]) -> bool:
-    """True where a fit leaves no more than noise in any block."""
-    excesses = [
-        excess(b, problem.recordings, fitted.residuals, levels, problem.settings)
-        for b in problem.blocks
-    ]
-    return all(one.ratio <= one.limit for one in excesses)
 
 
 def _power(problem: Problem, fitted: Fit) -> float:

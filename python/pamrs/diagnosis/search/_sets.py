@@ -20,7 +20,7 @@ from pamrs.diagnosis.evidence import (
     share_left,
     significant,
 )
-from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
+from pamrs.diagnosis.fit import Start, acts_in, start_of, two_at_a_time
 from pamrs.diagnosis.noise import with_sizes
 from pamrs.diagnosis.prepare import CLEARLY_LESS, Block
 from pamrs.diagnosis.screen import Score, Screen, Tangent, best_of_each_kind, by_effect, tangent_of
@@ -181,23 +181,18 @@ class _Growing:
     tried_sets: set[Hypothesis] = field(default_factory=set)
     likely: list[_Partner] = field(default_factory=list)
 
-    @property
-    def attempts(self) -> Attempts:
-        """Recordings, model, noise levels."""
-        return self.search.attempts
-
     def grow(self, sets: list[FittedHypothesis]) -> list[FittedHypothesis]:
         """Grow the best set by one term after the other."""
         weight = self.search.weight
         best = max(sets, key=weight, default=None)
         grown: list[FittedHypothesis] = []
-        while best is not None and len(best.terms) < self.attempts.settings.most_terms:
+        while best is not None and len(best.terms) < self.search.attempts.settings.most_terms:
             formed = self._in_best_forms(best, [*sets, *grown])
             grown += formed
             best = max(formed, key=weight)
             widened = self.widen(best)
             further = max(widened, key=weight, default=None)
-            if further is None or not _predicts_better(further, best, self.attempts):
+            if further is None or not _predicts_better(further, best, self.search.attempts):
                 break
             grown += widened
             best = further
@@ -209,20 +204,16 @@ class _Growing:
         """A set with its effects in their best forms, and its rivals in the forms that it has then:
         which of them leaves least must not depend on whose forms were looked at.
         """
-        attempts = self.attempts
+        attempts = self.search.attempts
         best = in_best_forms(self.search, base)
-        before, after = (
-            {e: attempts.start_of(c.fit, e).kind for e in base.effects} for c in (base, best)
-        )
+        before, after = ({e: start_of(c.fit, e).kind for e in base.effects} for c in (base, best))
         mended = {e for e in base.effects if before[e] != after[e]}
         rivals = self.search.heaviest_first(
             c for c in others if mended & set(c.effects) and c.fit.events is None
         )
 
         def formed(rival: FittedHypothesis) -> FittedHypothesis | None:
-            starts = [
-                attempts.start_of((best if e in mended else rival).fit, e) for e in rival.effects
-            ]
+            starts = [start_of((best if e in mended else rival).fit, e) for e in rival.effects]
             return attempts.fit_together(starts, rival.fit, rival.wrong)
 
         reformed = two_at_a_time(formed, rivals[: attempts.settings.most_polished])
@@ -230,7 +221,7 @@ class _Growing:
 
     def widen(self, base: FittedHypothesis) -> list[FittedHypothesis]:
         """A set with each of its likely partners, fitted from where both are."""
-        starts = self.attempts.starts_of(base)
+        starts = self.search.attempts.starts_of(base)
         partners = []
         for partner in self._partners(base, starts):
             if not self._was_tried(base, partner.terms):
@@ -241,7 +232,7 @@ class _Growing:
         def fitted(partner: _Partner) -> FittedHypothesis | None:
             warm = replace(base.fit, values=base.fit.values | partner.values)
             wrong = (*base.wrong, *partner.wrong)
-            return self.attempts.fit_together([*starts, *partner.starts], warm, wrong)
+            return self.search.attempts.fit_together([*starts, *partner.starts], warm, wrong)
 
         return [c for c in two_at_a_time(fitted, partners) if c is not None]
 
@@ -253,7 +244,7 @@ class _Growing:
         """Partners of a set: effects whose signature is in what it leaves, terms that explain much
         alone, and parameters that it moves far.
         """
-        if far_above_noise(self.attempts, base):
+        if far_above_noise(self.search.attempts, base):
             alone = len(base.terms) == 1
             likely = (alone and self.likely) or self._shortlisted(base, starts)
             if alone:
@@ -266,7 +257,7 @@ class _Growing:
                 if not self._was_tried(base, (scores[0].effect,)):
                     yield self._begun_best(base, starts, scores)
         yield from self._telling(base)
-        far = far_parameters(self.attempts, base.fit) if base.effects else []
+        far = far_parameters(self.search.attempts, base.fit) if base.effects else []
         yield from (_Partner([], (name,)) for name in far if name not in base.wrong)
 
     def _shortlisted(self, base: FittedHypothesis, base_starts: list[Start]) -> list[_Partner]:
@@ -283,7 +274,7 @@ class _Growing:
         ]
         best: dict[Term, _Partner] = {}
         for candidate, start in self._shortly(base, base_starts, further):
-            begin = self.attempts.start_of(candidate.fit, start.effect)
+            begin = start_of(candidate.fit, start.effect)
             best.setdefault(start.effect, _Partner([begin]))
         return list(best.values())[:BEAM]
 
@@ -295,7 +286,7 @@ class _Growing:
         """
 
         def begin(start: Start) -> FittedHypothesis | None:
-            return self.attempts.fit_shortly([*base_starts, start], base.fit, base.wrong)
+            return self.search.attempts.fit_shortly([*base_starts, start], base.fit, base.wrong)
 
         short = zip(two_at_a_time(begin, starts), starts, strict=True)
         fitted = [(c, start) for c, start in short if c is not None]
@@ -311,7 +302,7 @@ class _Growing:
 
     def _signatures(self, base: FittedHypothesis) -> list[list[Score]]:
         """The effects that would take most of what a set leaves, each from all its starts."""
-        attempts = self.attempts
+        attempts = self.search.attempts
         tangent, ranked = self.search.rank(base)
         alone = len(base.terms) == 1
         # what a term leaves is a mismatch of its own, however large what it takes is
@@ -346,7 +337,7 @@ class _Growing:
         ]
         return [
             _Partner(
-                self.attempts.starts_of(c),
+                self.search.attempts.starts_of(c),
                 c.wrong,
                 {name: c.fit.values[name] for name in c.wrong},
             )
@@ -437,7 +428,7 @@ def _in_another_form(
 ) -> FittedHypothesis | None:
     """A set with one effect in another form, where one leaves clearly less."""
     attempts = search.attempts
-    now = attempts.start_of(base.fit, effect)
+    now = start_of(base.fit, effect)
     others = [
         score.start.scaled(score.size)
         for score in best_of_each_kind(scores)
@@ -446,7 +437,7 @@ def _in_another_form(
     if not others:
         return None
     search.tell(f"trying other forms of {effect} in {base.hypothesis}")
-    rest = [attempts.start_of(base.fit, e) for e in base.effects if e != effect]
+    rest = [start_of(base.fit, e) for e in base.effects if e != effect]
 
     def begin(start: Start) -> FittedHypothesis | None:
         # parameters that both forms have go on from where they are
