@@ -64,7 +64,7 @@ from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationE
 from pamrs.findings import MOST_MISSED, Answer, MissingInput, NextExperiment, beyond
 from pamrs.recordings import Case, is_table, load_case
 from pamrs.report.words import listed
-from pamrs.rig import Rig, load_rig
+from pamrs.rig import OtherChoice, Rig, load_rig
 from pamrs.simulation import core_rig, supplies_of
 
 __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose", "missing_input"]
@@ -404,7 +404,7 @@ def _answered(
     fit_problem: Problem,
     held_out_problem: Problem,
     unjudged: list[Unjudged],
-    say: Steps,
+    say: Callable[..., None],
 ) -> _Answered:
     """Answer once no wrong unit was found."""
     every = fit_problem.blocks
@@ -496,8 +496,10 @@ def _under_best_law(
 
     best = stated
     for choice, recordings in promising_laws(case.rig, fit_problem, answer, divided):
-        law = f"with {choice.name} = {choice.other}: "
-        tell = Steps(lambda line, law=law: say(law + line))  # type: ignore[misc]
+
+        def tell(line: str, _: float | None = None, choice: OtherChoice = choice) -> None:
+            say(f"with {choice.name} = {choice.other}: {line}")
+
         with suppress(PamrsError):  # a rig that these recordings cannot be of
             other = _answered(case.with_rig(choice.rig), *recordings, tell)
             if is_better(other.diagnosis, best.diagnosis):
