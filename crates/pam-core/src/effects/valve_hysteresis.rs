@@ -1,8 +1,8 @@
 //! `valve_hysteresis`: play of the spool by the friction of spool and solenoid.
 //!
 //! `play`: `y <- min(max(y, x - h), x + h)`: the spool `y` follows the commanded position `x` at a
-//! distance `h`. Between steps the recursion is exact; a data sheet's hysteresis is `2 h` of the
-//! stroke. M. Al Janaideh, S. Rakheja & C.-Y. Su, "An analytical generalized Prandtl-Ishlinskii
+//! distance `h`. It begins as moved from the null, where its springs hold it. Between steps the
+//! recursion is exact; a data sheet's hysteresis is `2 h` of the stroke. M. Al Janaideh, S. Rakheja & C.-Y. Su, "An analytical generalized Prandtl-Ishlinskii
 //! model inversion for hysteresis compensation in micropositioning control", IEEE/ASME Trans.
 //! Mechatronics 16, 2011 (play operator).
 //!
@@ -81,11 +81,9 @@ fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
 
 impl<S: Scalar> Effect<S> for Play<S> {
     fn position(&self, own: &[S], input: S, _age: f64) -> S {
-        if begun(own) {
-            followed(own[1], input, self.half_width)
-        } else {
-            input
-        }
+        // springs centre a spool that has not been moved yet
+        let spool = if begun(own) { own[1] } else { constant(0.0) };
+        followed(spool, input, self.half_width)
     }
 
     fn follow(&self, own: &mut [S], input: S, step: f64) -> S {
@@ -134,6 +132,8 @@ mod tests {
         assert_eq!(followed(up, 0.485, h), up, "a small return does not move it");
         assert!((followed(up, 0.3, h) - 0.31_f64).abs() < 1e-15);
         assert_eq!(followed(0.2, 0.7, 0.0), 0.7);
+        let begins = |x: f64| Play { half_width: h }.position(&[0.0, 0.3], x, 0.0);
+        assert_eq!((begins(0.5), begins(-0.5), begins(0.005)), (0.49, -0.49, 0.0));
     }
 
     #[test]
