@@ -423,8 +423,10 @@ def _answered(
         groups = [_scaled_for_unknown_geometry(g, _UNKNOWN_GEOMETRY_FACTOR) for g in groups]
     say("putting the answer together", _JUDGED[1])
     judged_names, failed = {block.name for block in fit_problem.blocks}, "its judgement failed"
-    failures = [Unjudged(b.name, b.covers, failed) for b in every if b.name not in judged_names]
-    unjudged = [*unjudged, *failures]
+    unjudged = [
+        *unjudged,
+        *(Unjudged(b.name, b.covers, failed) for b in every if b.name not in judged_names),
+    ]
     limits = fit_problem.losses.part(
         "the limits", lambda: _limits(case.rig, groups, fit_problem, held_out_problem)
     )
@@ -487,8 +489,10 @@ def _under_best_law(
     """Answer under the best of other laws where the rig file's laws leave a mismatch."""
     case, answer = stated.case, stated.diagnosis
     # a law that needs more names than the one of the rig file is no better
-    most = min(max(1, names_open(answer)), fit_problem.settings.most_terms)
-    settings = replace(fit_problem.settings, most_terms=most)
+    settings = replace(
+        fit_problem.settings,
+        most_terms=min(max(1, names_open(answer)), fit_problem.settings.most_terms),
+    )
 
     def divided(rig: Rig) -> tuple[Problem, Problem, list[Unjudged]]:
         fitted, held_out, unjudged, _ = _problems(case.with_rig(rig), settings, considered)
@@ -648,8 +652,9 @@ def _judged_only(
     judged = {block.name: block for group in groups for block in group.blocks}
     if not judged:
         raise DiagnosisError("; ".join(fit_problem.losses.sentences))
-    kept = [judged[b.name] for b in fit_problem.blocks if b.name in judged]
-    fitted = replace(fit_problem, blocks=kept)
+    fitted = replace(
+        fit_problem, blocks=[judged[b.name] for b in fit_problem.blocks if b.name in judged]
+    )
     same, blocks = held_out_problem is fit_problem, fitted.blocks
     return fitted, fitted if same else replace(held_out_problem, blocks=blocks)
 

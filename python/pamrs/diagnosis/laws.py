@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from pamrs.diagnosis.fit import Fit, Problem, fit
+from pamrs.diagnosis.fit import Problem, fit
 from pamrs.diagnosis.noise import no_inflation
 from pamrs.diagnosis.prepare import AS_LARGE, CLEARLY_LESS, Unjudged
 from pamrs.diagnosis.result import Diagnosis
@@ -42,8 +42,6 @@ def promising_laws(
         The recordings under another rig.
     """
     suspects, found = {part.block for part in stated_diagnosis.answer.parts}, stated_diagnosis.rig
-    # after the few evaluations of a first fit
-    briefly = lambda part, rig, inflation: fit(part, rig, (), {}, inflation)  # noqa: E731
     for mechanical in (False, True):
         blocks = [b for b in problem.blocks if b.mechanical == mechanical]
         if not any(b.name in suspects for b in blocks):
@@ -55,7 +53,7 @@ def promising_laws(
                 continue
             try:
                 divided = prepared(choice.rig)
-                missed = _missed(choice.rig, divided[0], names, briefly)
+                missed = _missed(choice.rig, divided[0], names, briefly=True)
             except PamrsError:
                 continue  # a rig that these recordings cannot be of
             if missed < least:
@@ -87,19 +85,16 @@ def _is_an_effect(choice: OtherChoice) -> bool:
     return any(form.name == choice.other for effect in own for form in effect.forms)
 
 
-def _missed(
-    rig: Rig,
-    problem: Problem,
-    names: Sequence[str],
-    refit: Callable[[Problem, Rig, dict[str, float]], Fit] = refitted,
-) -> float:
-    """Sum of squares that some blocks leave, refitted inside their tolerances; infinite where one
-    is not there.
+def _missed(rig: Rig, problem: Problem, names: Sequence[str], *, briefly: bool = False) -> float:
+    """Sum of squares that some blocks leave, refitted inside their tolerances (to their end, or in
+    the few evaluations of a first fit); infinite where one is not there.
     """
     blocks = [b for b in problem.blocks if b.name in names]
     if len(blocks) < len(names):
         return math.inf
-    return 2.0 * refit(replace(problem, blocks=blocks), rig, no_inflation(blocks)).cost
+    part, inflation = replace(problem, blocks=blocks), no_inflation(blocks)
+    found = fit(part, rig, (), {}, inflation) if briefly else refitted(part, rig, inflation)
+    return 2.0 * found.cost
 
 
 def is_better(other: Diagnosis, stated: Diagnosis) -> bool:

@@ -164,12 +164,12 @@ def _changed(compared: Compared, first: Mapping[str, Any], second: Mapping[str, 
     for key in ("inputs", "settings", "version"):
         one, other = first.get(key), second.get(key)
         if one != other and one is not None and other is not None:
-            names = (
-                [f"{one} and {other}"]
+            sentences.append(
+                f"version {one} and {other}"
                 if key == "version"
-                else sorted(n for n in {*one, *other} if one.get(n) != other.get(n))
+                else f"{key} differ: "
+                + ", ".join(sorted(n for n in {*one, *other} if one.get(n) != other.get(n)))
             )
-            sentences.append(f"{key}{' differ:' * (key != 'version')} {', '.join(names)}")
     return sentences
 
 

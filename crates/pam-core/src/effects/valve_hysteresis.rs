@@ -2,9 +2,10 @@
 //!
 //! `play`: `y <- min(max(y, x - h), x + h)`: the spool `y` follows the commanded position `x` at a
 //! distance `h`. It begins as moved from the null, where its springs hold it. Between steps the
-//! recursion is exact; a data sheet's hysteresis is `2 h` of the stroke. M. Al Janaideh, S. Rakheja & C.-Y. Su, "An analytical generalized Prandtl-Ishlinskii
-//! model inversion for hysteresis compensation in micropositioning control", IEEE/ASME Trans.
-//! Mechatronics 16, 2011 (play operator).
+//! recursion is exact; a data sheet's hysteresis is `2 h` of the stroke. M. Al Janaideh, S. Rakheja
+//! & C.-Y. Su, "An analytical generalized Prandtl-Ishlinskii model inversion for hysteresis
+//! compensation in micropositioning control", IEEE/ASME Trans. Mechatronics 16, 2011 (play
+//! operator).
 //!
 //! `play_with_slope`: `x_e = y + g (x - y)`: a spool that gives by a share `g` before it breaks
 //! away, so that no small command is lost. The play operator and a linear part of the same paper.

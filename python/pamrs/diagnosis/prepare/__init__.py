@@ -8,7 +8,6 @@ from pamrs.diagnosis.prepare._beginning import (
     with_unjudged_starts,
 )
 from pamrs.diagnosis.prepare._blocks import (
-    ARM_WINDOW,
     OFTEN_WINDOW,
     Block,
     Input,
@@ -66,7 +65,6 @@ from pamrs.diagnosis.prepare._signals import (
 )
 
 __all__ = [
-    "ARM_WINDOW",
     "AS_LARGE",
     "CLEARLY_LESS",
     "NOISE_STDS",

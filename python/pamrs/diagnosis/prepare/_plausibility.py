@@ -598,11 +598,7 @@ def without_dead_commands(
         evidence = {r.name: _dead_commands(r, rig).get(command) for r in recordings_left}
         dead = {name: text for name, text in evidence.items() if text}
         # what has that one value elsewhere was not logged there either
-        live = [
-            r
-            for r in recordings_left
-            if r.name not in dead and np.unique(_values(r, command)).size > 1
-        ]
+        live = [r for r in recordings_left if r.name not in dead and _moves(r, command)]
         if not dead:
             continue
         if any(r.role == "fit" for r in live):
@@ -617,6 +613,12 @@ def without_dead_commands(
         text = f"{next(iter(dead.values()))}: it was not logged; {done}"
         faults.append(Faulty(command, "not_logged", text))
     return recordings_left, faults
+
+
+def _moves(recording: Recording, channel: str) -> bool:
+    """True where a channel has more than one value."""
+    values = _values(recording, channel)
+    return bool(values.size) and float(np.ptp(values)) > 0.0
 
 
 def without_channel(recording: Recording, channel: str) -> Recording:

@@ -28,7 +28,7 @@ from pamrs.diagnosis.evidence import (
     significant,
 )
 from pamrs.diagnosis.fit import Problem, Start, acts_in, concerns
-from pamrs.diagnosis.prepare import ARM_WINDOW, OFTEN_WINDOW, Block
+from pamrs.diagnosis.prepare import OFTEN_WINDOW, Block
 from pamrs.diagnosis.screen import by_effect
 from pamrs.diagnosis.search._attempts import Attempts
 from pamrs.diagnosis.search._baseline import (
@@ -174,9 +174,11 @@ def _begin_part(
             return OnlyNoise(refit, healthy_group(refit, common), tell)
     if refit.attempts.suspects:
         found = _fit_hypotheses(refit, tell)
-        what = "the search with more starts of the motion"
-        often = partial(_begun_often, found, fit_problem, held_out_problem, nominal, tell)
-        return fit_problem.losses.part(what, often, found)
+        return fit_problem.losses.part(
+            "the search with more starts of the motion",
+            partial(_begun_often, found, fit_problem, held_out_problem, nominal, tell),
+            found,
+        )
     return OnlyNoise(refit, refit.group([refit.start], {UNDECIDED: 1.0}, None), tell)
 
 
@@ -222,9 +224,10 @@ def _begun_often(
     squares has minima everywhere; the shorter the window, the smoother (Ribeiro et al., On the
     smoothness of nonlinear system identification, Automatica 121, 2020).
     """
-    if not found.block.mechanical or _leading(found.weighed) != UNLISTED:
+    begins = found.block.mechanical and any(b.window is not None for b in fit_problem.blocks)
+    if not begins or _leading(found.weighed) != UNLISTED:
         return found
-    tell(f"nothing named on windows of {ARM_WINDOW:g} s: trying windows of {OFTEN_WINDOW:g} s")
+    tell(f"nothing named: trying windows of {OFTEN_WINDOW:g} s")
     blocks = [
         b if b.window is None else replace(b, window=OFTEN_WINDOW) for b in fit_problem.blocks
     ]

@@ -236,8 +236,9 @@ def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Rea
             excess(b, reread.recordings, now.residuals, levels, reread.settings)
             for b in reread.blocks
         )
-        excessive = any(one.ratio > one.limit for one in left)
-        if was.cost - now.cost < least * max(1.0, after) or excessive:
+        if was.cost - now.cost < least * max(1.0, after) or any(
+            one.ratio > one.limit for one in left
+        ):
             return None
         inflation = inflation_of(reread, now, levels)
         none, listed, far = (
