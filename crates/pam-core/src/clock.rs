@@ -57,13 +57,44 @@ impl<S: Scalar> Held<S> {
         }
     }
 
-    /// Mean of a value over the step.
-    pub fn mean(&self, value: impl Fn(i64) -> S) -> S {
+    /// What is commanded over the step, by the value of a sample.
+    pub fn edge(&self, value: impl Fn(i64) -> S) -> Edge<S> {
         let now = value(self.now);
-        if self.before == self.now {
-            return now;
-        }
-        now + self.share_before * (value(self.before) - now)
+        let before = if self.before == self.now { now } else { value(self.before) };
+        Edge { now, before, share_before: self.share_before }
+    }
+}
+
+/// A command over a step: one value, and then another.
+///
+/// Valves and regulators follow each, and not their mean: the flow of a mean opening is not the mean
+/// of what openings pass one after the other, and a limit of a rate acts on each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge<S> {
+    /// At the end of the step.
+    pub now: S,
+    /// At its beginning.
+    pub before: S,
+    /// Share of the step until it changes [1].
+    pub share_before: S,
+}
+
+impl<S: Scalar> Edge<S> {
+    /// The same value all the time.
+    #[inline]
+    pub fn steady(value: S) -> Self {
+        Self { now: value, before: value, share_before: constant(0.0) }
+    }
+
+    /// Whether it is not the same at both ends of the step.
+    #[inline]
+    pub fn changes(&self) -> bool {
+        self.before.re() != self.now.re()
+    }
+
+    /// Mean value over the step.
+    pub fn mean(&self) -> S {
+        self.now + self.share_before * (self.before - self.now)
     }
 }
 
@@ -75,11 +106,12 @@ mod tests {
     #[test]
     fn an_edge_moves_through_a_step() {
         let value = |k: i64| if k < 3 { 1.0 } else { 5.0 };
-        let mean = |time: f64, shift: f64| Held::over(time, 1e-3, 5e-3, shift).mean(value);
+        let mean = |time: f64, shift: f64| Held::over(time, 1e-3, 5e-3, shift).edge(value).mean();
         assert_eq!((mean(0.014, 0.0), mean(0.015, 0.0), mean(0.015, 2e-3)), (1.0, 5.0, 1.0));
         assert!((mean(0.017, 2.25e-3) - (0.25 * 1.0 + 0.75 * 5.0)).abs() < 1e-9);
         let slope = Held::over(0.017, 1e-3, 5e-3, Slope::new(2.25e-3, 1.0))
-            .mean(|k| Slope::from(value(k)))
+            .edge(|k| Slope::from(value(k)))
+            .mean()
             .slope();
         assert!((slope + 4.0 / 1e-3).abs() < 1e-6, "{slope}");
     }
@@ -89,7 +121,7 @@ mod tests {
         let value = |k: i64| Slope::from(if k < 3 { 1.0 } else { 5.0 });
         let shift = |by: f64| Slope::new(by, 1.0);
         let ends = |held: Held<Slope>| (held.before, held.now, held.share_before);
-        let mean = Held::over(0.015, 1e-3, 5e-3, shift(0.0)).mean(value);
+        let mean = Held::over(0.015, 1e-3, 5e-3, shift(0.0)).edge(value).mean();
         assert!((mean.re - 5.0).abs() < 1e-9 && (mean.slope() + 4.0 / 1e-3).abs() < 1e-6);
         let (first, last, share) = ends(Held::over(0.02, 1e-3, 5e-3, shift(5e-3)));
         assert_eq!((first, last), (2, 3));

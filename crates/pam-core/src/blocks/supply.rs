@@ -10,38 +10,11 @@
 //! A regulator lets through what its inlet has and no more: behind a supply of the pressure `P_in`
 //! it brings its outlet towards `min(P_set, P_in)`, dead band or not: wide open it reduces nothing.
 
+use crate::clock::Edge;
 use crate::scalar::{constant, Scalar};
 
 /// Rate of a regulator's outlet pressure that is no limit [Pa/s].
 pub use crate::keys::FASTEST;
-
-/// Set pressure of a regulator over a step [Pa, absolute]: one, and then another.
-///
-/// Limits of the outlet's rate act on each, and not on their mean, so that an edge inside a step
-/// moves the outlet as far as it lies from the step's end.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SetPressure<S> {
-    /// At the end of the step.
-    pub now: S,
-    /// At its beginning.
-    pub before: S,
-    /// Share of the step until it changes [1].
-    pub share_before: S,
-}
-
-impl<S: Scalar> SetPressure<S> {
-    /// The same pressure all the time.
-    #[inline]
-    pub fn steady(pressure: S) -> Self {
-        Self { now: pressure, before: pressure, share_before: constant(0.0) }
-    }
-
-    /// Whether it is not the same at both ends of the step.
-    #[inline]
-    pub fn changes(&self) -> bool {
-        self.before.re() != self.now.re()
-    }
-}
 
 /// A supply of air.
 #[derive(Debug, Clone, Copy)]
@@ -88,7 +61,7 @@ impl<S: Scalar> Supply<S> {
         pressure: S,
         outflow: S,
         rt: f64,
-        set: &SetPressure<S>,
+        set: &Edge<S>,
         inlet: Option<S>,
     ) -> S {
         match self {
@@ -164,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_regulator_is_brought_to_its_inlet_where_that_is_below_its_command() {
-        let at = SetPressure::steady;
+        let at = Edge::steady;
         for dead_band in [0.0, 2e4] {
             let regulator = Supply::<f64>::Regulator {
                 time_constant: 0.1,
@@ -184,7 +157,7 @@ mod tests {
             assert_eq!(rate(1e5, 0.0, 9e5, Some(8e5)), 2e6);
             assert_eq!(rate(4e5, 1e-3, 5e5, Some(9e5)), rate(4e5, 1e-3, 5e5, None));
             // each part of a step by itself
-            let edge = SetPressure { now: 5e5, before: 2.5e5, share_before: 0.5 };
+            let edge = Edge { now: 5e5, before: 2.5e5, share_before: 0.5 };
             let parts = [5e5, 2.5e5].map(|set| rate(2e5, 0.0, set, Some(3e5)));
             let both = regulator.pressure_rate(2e5, 0.0, 8.4e4, &edge, Some(3e5));
             assert!((both - (parts[0] + parts[1]) / 2.0).abs() < 1e-6);
@@ -202,10 +175,10 @@ mod tests {
             dead_band: 0.0,
         };
         assert_eq!(regulator.dead_time(), 0.03);
-        let at = SetPressure::steady;
+        let at = Edge::steady;
         assert_eq!(regulator.pressure_rate(1e5, 0.0, 8.4e4, &at(5e5), None), 2e6);
         assert_eq!(regulator.pressure_rate(5e5, 0.0, 8.4e4, &at(1e5), None), -3e6);
-        let edge = SetPressure { now: 5e5, before: 1e5, share_before: 0.25 };
+        let edge = Edge { now: 5e5, before: 1e5, share_before: 0.25 };
         assert_eq!(regulator.pressure_rate(1e5, 0.0, 8.4e4, &edge, None), 1.5e6);
         assert!(regulator.pressure_rate(5e5 - 1e4, 1e-3, 8.4e4, &at(5e5), None).abs() < 1e-6);
         assert!((regulator.pressure_rate(4e5, 0.0, 8.4e4, &at(5e5), None) - 1e6).abs() < 1e-6);

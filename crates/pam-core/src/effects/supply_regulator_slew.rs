@@ -68,7 +68,7 @@ impl<S: Scalar> Effect<S> for Slew<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blocks::supply::SetPressure;
+    use crate::clock::Edge;
 
     #[test]
     fn it_rises_and_falls_no_faster() {
@@ -81,9 +81,8 @@ mod tests {
             dead_band: 0.0,
         };
         Slew { rise: 7e6, fall: 2e6 }.answers(&mut supply);
-        let rate = |pressure, set| {
-            supply.pressure_rate(pressure, 0.0, 8.4e4, &SetPressure::steady(set), None)
-        };
+        let rate =
+            |pressure, set| supply.pressure_rate(pressure, 0.0, 8.4e4, &Edge::steady(set), None);
         assert_eq!((rate(1e5, 5e5), rate(5e5, 1e5)), (1e6, -2e6));
         assert!((rate(1e5, 1.01e5) - 1e5).abs() < 1e-6);
     }

@@ -7,8 +7,9 @@ use crate::blocks::chamber::{
     cube_area, cylinder_area, energy_rate, gas_temperature, pressure_rate, wall_heat, wall_rate,
     ChamberState,
 };
-use crate::blocks::supply::{SetPressure, Supply};
+use crate::blocks::supply::Supply;
 use crate::blocks::valve::Opening;
+use crate::clock::Edge;
 use crate::effects::{Extremes, BAR};
 use crate::scalar::{constant, Scalar};
 
@@ -84,8 +85,21 @@ impl<S: Scalar> Plant<'_, S> {
         here.drawn.fill(zero);
         here.vented = zero;
         for k in 0..self.valves.len() {
-            if let Some((from, to, flow)) = self.through_valve(k, controls.spool[k], state) {
-                here.pass(from, to, flow);
+            let moves = || self.wiring.ports.moves_valve(k);
+            match controls.edges.get(k).filter(|edge| edge.changes() && !moves()) {
+                None => {
+                    if let Some((from, to, flow)) = self.through_valve(k, controls.spool[k], state)
+                    {
+                        here.pass(from, to, flow);
+                    }
+                }
+                Some(Edge { now, before, share_before }) => {
+                    for (spool, share) in [(before, *share_before), (now, -*share_before + 1.0)] {
+                        if let Some((from, to, flow)) = self.through_valve(k, *spool, state) {
+                            here.pass(from, to, flow * share);
+                        }
+                    }
+                }
             }
         }
         for (k, unit) in self.wiring.lines.iter().enumerate() {
@@ -324,7 +338,7 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Rate of a supply's pressure with the effects on it [Pa/s].
     #[inline(never)]
-    fn altered_supply(&self, k: usize, state: &[S], drawn: S, rt: f64, set: &SetPressure<S>) -> S {
+    fn altered_supply(&self, k: usize, state: &[S], drawn: S, rt: f64, set: &Edge<S>) -> S {
         let pressure = state[self.layout.supply(k)];
         let altered = |mut set: S| {
             let mut drawn = drawn;
@@ -335,7 +349,7 @@ impl<S: Scalar> Plant<'_, S> {
         };
         let (drawn, now) = altered(set.now);
         let before = if set.changes() { altered(set.before).1 } else { now };
-        let (set, inlet) = (SetPressure { now, before, ..*set }, self.inlet_pressure(k, state));
+        let (set, inlet) = (Edge { now, before, ..*set }, self.inlet_pressure(k, state));
         self.supplies[k].pressure_rate(pressure, drawn, rt, &set, inlet)
     }
 

@@ -4,9 +4,9 @@
 use super::ports::{moves, Acting};
 use super::rates::{Controls, Plant};
 use super::units::SupplyUnit;
-use crate::blocks::supply::{SetPressure, Supply};
+use crate::blocks::supply::Supply;
 use crate::blocks::valve::spool_position;
-use crate::clock::Held;
+use crate::clock::{Edge, Held};
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
@@ -14,9 +14,9 @@ impl<S: Scalar> Plant<'_, S> {
     pub fn controls(&self, commands: impl Fn(usize) -> f64) -> Controls<S> {
         let zeros = |n: usize| vec![constant(0.0); n];
         let (supplies, valves) = (self.wiring.supplies.len(), self.wiring.valves.len());
-        let unset = vec![SetPressure::steady(constant(0.0)); supplies];
-        let (spool, earlier) = (zeros(valves), Vec::new());
-        let mut out = Controls { set_pressure: unset, spool, earlier, time: 0.0 };
+        let unset = vec![Edge::steady(constant(0.0)); supplies];
+        let (spool, edges) = (zeros(valves), Vec::new());
+        let mut out = Controls { set_pressure: unset, spool, edges, time: 0.0 };
         self.command(commands, &mut out);
         out
     }
@@ -34,12 +34,12 @@ impl<S: Scalar> Plant<'_, S> {
                 }
                 _ => supply.initial_pressure,
             };
-            *set = SetPressure::steady(self.absolute(pressure));
+            *set = Edge::steady(self.absolute(pressure));
         }
         for (k, spool) in out.spool.iter_mut().enumerate() {
             *spool = self.opened(k, self.commanded(k, commands(k)));
         }
-        out.earlier.clear();
+        out.edges.clear();
         out.time = 0.0;
     }
 
@@ -116,26 +116,18 @@ impl<S: Scalar> Plant<'_, S> {
     ) {
         let wiring = &self.wiring;
         self.command(|_| 0.0, controls);
-        let switches = wiring.ports.switches();
         for (k, spool) in controls.spool.iter_mut().enumerate() {
             let held = Held::over(time, step, sample_time, shift + self.late(k));
-            let commanded = |sample| self.commanded(k, command(k, sample));
-            if switches {
-                controls.earlier.push((commanded(held.before), held.share_before));
-            }
-            *spool = if wiring.ports.switching[k].is_some() {
-                commanded(held.now)
-            } else {
-                self.opened(k, held.mean(commanded))
-            };
+            let edge = held.edge(|sample| self.opened(k, self.commanded(k, command(k, sample))));
+            *spool = if wiring.ports.switching[k].is_some() { edge.now } else { edge.mean() };
+            controls.edges.push(edge);
         }
         let mut input = wiring.valves.len();
         for (supply, set) in self.supplies.iter().zip(&mut controls.set_pressure) {
             if matches!(supply, Supply::Regulator { .. }) {
                 let late = shift + supply.dead_time();
-                let Held { before, now, share_before } = Held::over(time, step, sample_time, late);
                 let pressure = |sample| self.absolute(command(input, sample));
-                *set = SetPressure { now: pressure(now), before: pressure(before), share_before };
+                *set = Held::over(time, step, sample_time, late).edge(pressure);
                 input += 1;
             }
         }
@@ -153,6 +145,7 @@ impl<S: Scalar> Plant<'_, S> {
     ) {
         out.set_pressure.clone_from(&controls.set_pressure);
         out.spool.clone_from(&controls.spool);
+        out.edges.clone_from(&controls.edges);
         out.time = time + age;
         let ports = &self.wiring.ports;
         for k in (0..ports.command.len()).filter(|valve| ports.moves_valve(*valve)) {

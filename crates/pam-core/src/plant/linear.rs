@@ -15,8 +15,8 @@ use super::memory::Memory;
 use super::ports::Acting;
 use super::rates::{Controls, Plant, Simulated};
 use super::{Rig, StateRole};
-use crate::blocks::supply::SetPressure;
 use crate::blocks::valve::spool_position;
+use crate::clock::Edge;
 use crate::description::dotted;
 use crate::dual::{Dual, LANES};
 use crate::effects::{Role, BEGUN};
@@ -394,8 +394,8 @@ impl<S: Scalar> Plant<'_, S> {
     fn held(&self, set: &[S]) -> Controls<S> {
         Controls {
             spool: vec![constant(0.0); self.valves.len()],
-            earlier: Vec::new(),
-            set_pressure: set.iter().map(|pressure| SetPressure::steady(*pressure)).collect(),
+            edges: Vec::new(),
+            set_pressure: set.iter().map(|pressure| Edge::steady(*pressure)).collect(),
             time: 0.0,
         }
     }

@@ -15,10 +15,11 @@ use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
 use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
 use crate::blocks::gas::Gas;
-use crate::blocks::supply::{SetPressure, Supply};
+use crate::blocks::supply::Supply;
 use crate::blocks::tube::Tube;
 use crate::blocks::valve::Opening;
 use crate::blocks::wave::Wave;
+use crate::clock::Edge;
 use crate::effects::{Effect, Number};
 use crate::scalar::{constant, Scalar};
 use crate::Result;
@@ -112,11 +113,10 @@ fn runs(driven: &[bool]) -> Vec<Range<usize>> {
 pub struct Controls<S> {
     /// Normalised spool position of each valve, -1 to 1.
     pub(crate) spool: Vec<S>,
-    /// Of each valve, where commands come late: the position before, and the share of the step until
-    /// it changes.
-    pub(crate) earlier: Vec<(S, S)>,
+    /// What each valve is asked for in the step, where commands come late.
+    pub(crate) edges: Vec<Edge<S>>,
     /// Set pressure of each supply.
-    pub(crate) set_pressure: Vec<SetPressure<S>>,
+    pub(crate) set_pressure: Vec<Edge<S>>,
     /// Time since the start [s], where an effect asks for it.
     pub(crate) time: f64,
 }

@@ -69,11 +69,11 @@ impl<S: Scalar> Plant<'_, S> {
         for (valve, acting) in ports.switching.iter().enumerate() {
             let Some(acting) = acting else { continue };
             let now = controls.spool[valve];
-            let edge = controls.earlier.get(valve).filter(|(before, _)| before.re() != now.re());
-            let change = edge.map(|(_, share)| *share * step);
+            let edge = controls.edges.get(valve).filter(|edge| edge.changes());
+            let change = edge.map(|edge| edge.share_before * step);
             let input = |age: f64| {
                 let seen = match edge {
-                    Some((before, share)) if age < share.re() * step => *before,
+                    Some(edge) if age < edge.share_before.re() * step => edge.before,
                     _ => now,
                 };
                 ports.command[valve].iter().fold(seen, |x, acting| {

@@ -1,8 +1,8 @@
 //! `dead_time`: the valve sees its command a time later, every edge as sharp as it was.
 //!
-//! What a bus, a driver or a sampled controller does to a command. Over a step in which the command
-//! that is seen changes the valve takes the mean, so that a shift of less than a step counts and has
-//! a slope. Three lags in its place, as `lag_and_delay` has them, round every edge over a time as
+//! What a bus, a driver or a sampled controller does to a command. In a step in which the command
+//! that is seen changes the valve passes the mean of the flows before and after, so that a shift of
+//! less than a step counts and has a slope. Three lags in its place, as `lag_and_delay` has them, round every edge over a time as
 //! long as the delay itself.
 
 use super::{DELAY, LAG_AND_DELAY};
