@@ -29,8 +29,7 @@ pub const INFO: EffectInfo = EffectInfo {
         parameters: &[EffectParameter::new("angle", "rad", -1.0, 1.0, 0.05)
             .starts(&[-0.05, 0.05])
             .prior(0.0, USUAL)
-            .off(0.0)
-            .same_everywhere()],
+            .off(0.0)],
         states: &[],
         integrates: false,
         ports: &[Port::Weight],

@@ -27,13 +27,11 @@ const USUAL: f64 = 0.01;
 const SINE: EffectParameter = EffectParameter::new("sine", "rad", -MOST, MOST, 0.005)
     .starts(&[-0.005, 0.005])
     .prior(0.0, USUAL)
-    .off(0.0)
-    .same_everywhere();
+    .off(0.0);
 const COSINE: EffectParameter = EffectParameter::new("cosine", "rad", -MOST, MOST, 0.0)
     .starts(&[0.005])
     .prior(0.0, USUAL)
-    .off(0.0)
-    .same_everywhere();
+    .off(0.0);
 
 /// Where nobody says it, the encoder was set at the angle zero; it may have been set anywhere on its
 /// turn.

@@ -188,7 +188,7 @@ impl EffectParameter {
         Self { scan: Some((low, high, count)), ..self }
     }
 
-    /// The same for a size that is the same in all recordings.
+    /// The same for one that is the same in all recordings, where others of its effect are not.
     #[must_use]
     pub const fn same_everywhere(self) -> Self {
         Self { same_everywhere: true, ..self }

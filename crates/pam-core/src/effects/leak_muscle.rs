@@ -26,8 +26,7 @@ const CONDUCTANCE: EffectParameter =
     EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-7, 5e-12)
         .starts(&[1e-11])
         .usually(USUAL.0, USUAL.1)
-        .off(0.0)
-        .same_everywhere();
+        .off(0.0);
 
 const ORIFICE_AND_LAMINAR: Form = Form {
     name: "orifice_and_laminar",

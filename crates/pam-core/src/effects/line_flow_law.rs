@@ -27,10 +27,7 @@ pub const INFO: EffectInfo = EffectInfo {
         Form {
             name: "power",
             parameters: &[
-                EffectParameter::new("laminar_part", "1", 0.0, 3.0, 1.0)
-                    .starts(&[1.0])
-                    .off(0.0)
-                    .same_everywhere(),
+                EffectParameter::new("laminar_part", "1", 0.0, 3.0, 1.0).starts(&[1.0]).off(0.0),
                 FLOW,
             ],
             ..LAMINAR

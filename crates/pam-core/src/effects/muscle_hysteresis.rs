@@ -32,14 +32,10 @@ use crate::scalar::{constant, Scalar};
 
 const CONSTANT: EffectParameter =
     EffectParameter::new("friction_constant", "N", 0.0, 10000.0, 5.0).starts(&[2.0]).off(0.0);
-const SLOPE: EffectParameter = EffectParameter::new("friction_pressure", "m2", 0.0, 1.0, 5e-5)
-    .starts(&[2e-5])
-    .off(0.0)
-    .same_everywhere();
-const SHARE: EffectParameter = EffectParameter::new("friction_force", "1", 0.0, 1.0, 0.03)
-    .starts(&[0.02])
-    .off(0.0)
-    .same_everywhere();
+const SLOPE: EffectParameter =
+    EffectParameter::new("friction_pressure", "m2", 0.0, 1.0, 5e-5).starts(&[2e-5]).off(0.0);
+const SHARE: EffectParameter =
+    EffectParameter::new("friction_force", "1", 0.0, 1.0, 0.03).starts(&[0.02]).off(0.0);
 const PRESLIDING: EffectParameter =
     EffectParameter::new("presliding", "m", 1e-6, 0.1, 0.001).starts(&[0.0005, 0.003]);
 

@@ -27,8 +27,7 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "angle_delay",
         parameters: &[EffectParameter::new("delay", "s", 0.0, 1.0, 0.01)
             .starts(&[0.005, 0.03])
-            .off(0.0)
-            .same_everywhere()],
+            .off(0.0)],
         states: &[],
         integrates: false,
         ports: &[Port::Clock],

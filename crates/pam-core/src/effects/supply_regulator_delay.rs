@@ -30,8 +30,7 @@ pub const INFO: EffectInfo = EffectInfo {
         parameters: &[EffectParameter::new("delay", "s", 0.0, 10.0, 0.02)
             .starts(&[0.02])
             .scan(0.002, 0.5, 13)
-            .off(0.0)
-            .same_everywhere()],
+            .off(0.0)],
         states: &[],
         integrates: false,
         ports: &[Port::Feed],

@@ -19,8 +19,7 @@ const TWO_AREAS: Form = Form {
     name: "two_areas",
     parameters: &[EffectParameter::new("excess", "1", -0.9, 0.9, 0.1)
         .starts(&[-0.1, 0.1])
-        .off(0.0)
-        .same_everywhere()],
+        .off(0.0)],
     states: &[],
     integrates: false,
     ports: &[Port::Area],

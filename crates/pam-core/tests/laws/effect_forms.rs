@@ -182,7 +182,7 @@ fn a_command_that_changes_within_a_step_passes_one_flow_and_then_the_other() {
     let late = |delay: f64, substeps: usize| {
         let mut effect = effect("input_path_lag", &[("delay", delay)]);
         effect.form = "dead_time".into();
-        let command = |k: usize| if k % 2 == 0 { 9.0 } else { 2.0 };
+        let command = |k: usize| [9.0, 2.0][k % 2];
         let rig = with(rigid_chamber(3e-4), vec![effect]);
         Run::new(rig, 60, 0.01, substeps, command, &[("muscle_pressure", 1e5)])
             .last("muscle_pressure")
