@@ -266,12 +266,13 @@ def next_to_record(
 
 def _first_asked(answer: Answer) -> Part | None:
     """The group of blocks that is asked about first: one that still misses much, one with several
-    answers left, one without a name; else the one that leads, if anything does.
+    answers left, one without a name, one that is not sure; else the one that leads, if anything
+    does.
     """
     missed = (answer.part_of(own.block) for own in answer.missed if own.block)
     open_ = (part for part in answer.parts if len(part.left) > 1)
     nameless = (part for part in answer.parts if part.group.verdict == "unlisted")
-    rest = () if answer.missed else answer.parts
+    rest = () if answer.missed else sorted(answer.parts, key=lambda part: part.sure)
     return next(filter(None, itertools.chain(missed, open_, nameless, rest)), None)
 
 
