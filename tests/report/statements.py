@@ -268,8 +268,8 @@ def _of_next(found: Diagnosis, page: str, summary: str) -> list[Statement]:
     block = str(own.excitation.get("block", ""))
     left = {m.block: sentences.left_in(found, m.block) for b in found.judged for m in b.mismatch}
     part = found.answer.part_of(block)
-    # an answer that is not sure is a question by itself, and so is a missing name
-    asked = part is not None and (not part.sure or part.group.verdict == "unlisted")
+    # an open name is a question by itself, and so is a missing one
+    asked = part is not None and (len(part.left) > 1 or part.group.verdict == "unlisted")
     if left.get(block) == "noise" and "more" in left.values() and not asked:
         told.append(Statement("block that keeps more than noise", block, "next experiment"))
         told.append(Statement("block that keeps more than noise", left, "blocks"))

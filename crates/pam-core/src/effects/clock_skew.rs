@@ -4,11 +4,11 @@
 //! `d = d_0 + r t`, an angle at `t - a d(t)`: the share `a` is 1 where one logger records both and
 //! 0 where the angle is on the commands' clock. Commands act on the recording later by `d`. Within
 //! a step the flows under the held commands are averaged over the shifted time, so that an edge moves
-//! through it continuously and the shift can be differentiated. The rate of some 1e-4 changes no other time. A
-//! clock that is ahead (`d < 0`) is known to a prediction from recordings; a simulation, which
-//! cannot answer a command that is still to come, takes it as no shift. D. L. Mills, "Internet time
-//! synchronization: the network time protocol", IEEE Trans. Communications 39, 1991 (offset and
-//! skew).
+//! through it continuously and the shift can be differentiated. The rate of some 1e-4 changes no
+//! other time. A clock that is ahead (`d < 0`) is known to a prediction from recordings; a
+//! simulation, which cannot answer a command that is still to come, takes it as no shift. D. L.
+//! Mills, "Internet time synchronization: the network time protocol", IEEE Trans. Communications 39,
+//! 1991 (offset and skew).
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port, SameData, Use};
 use crate::blocks::gas::Gas;

@@ -35,7 +35,7 @@ from pamrs.experiments import (
     joined,
     protocol_of,
 )
-from pamrs.findings import Answer, Findings, Limit, NextExperiment, PairExperiment, Part
+from pamrs.findings import Findings, Limit, NextExperiment, PairExperiment, Part
 from pamrs.report.sentences import left_in
 from pamrs.report.words import capital, hypothesis_label, spoken_name
 from pamrs.rig import Rig
@@ -241,7 +241,7 @@ def next_to_record(
     asked = _Question(nominal, judged, fit_problem.blocks, recordings, fit_problem)
     same = same_data(ambiguity)
     simulated: NextExperiment | None = None
-    first = _first_asked(diagnosis.answer)
+    first = _first_asked(diagnosis)
     if first is not None and len(first.left) > 1 and len(hypotheses) > 1 and not same:
         with contextlib.suppress(
             DiagnosisError, ParameterError, SimulationError
@@ -264,22 +264,29 @@ def next_to_record(
     return replace(simulated, pairs=pairs, hypotheses=list(hypotheses), noise=asked.noise)
 
 
-def _first_asked(answer: Answer) -> Part | None:
+def _first_asked(diagnosis: Findings) -> Part | None:
     """The group of blocks that is asked about first: one that still misses much, one with several
-    answers left, one without a name, one that is not sure; else the one that leads, if anything
-    does.
+    answers left, one without a name; else one that keeps more than noise, one that is not sure, or
+    the one that leads, if anything does.
     """
+    answer = diagnosis.answer
     missed = (answer.part_of(own.block) for own in answer.missed if own.block)
-    open_ = (part for part in answer.parts if len(part.left) > 1)
-    nameless = (part for part in answer.parts if part.group.verdict == "unlisted")
-    rest = () if answer.missed else sorted(answer.parts, key=lambda part: part.sure)
-    return next(filter(None, itertools.chain(missed, open_, nameless, rest)), None)
+    # several answers first, then none that has a name
+    open_ = sorted(
+        (p for p in answer.parts if len(p.left) > 1 or p.group.verdict == "unlisted"),
+        key=lambda part: len(part.left) == 1,
+    )
+    rest = sorted(
+        () if answer.missed else answer.parts,
+        key=lambda part: (left_in(diagnosis, part.block or "") != "more", part.sure),
+    )
+    return next(filter(None, itertools.chain(missed, open_, rest)), None)
 
 
 def _without_models(asked: _Question, diagnosis: Findings) -> NextExperiment:
     """Next experiment where no two hypotheses could be simulated."""
     answer = diagnosis.answer
-    part = _first_asked(answer)
+    part = _first_asked(diagnosis)
     if answer.settled:
         what = "answer" if not answer.named else "names" if len(answer.named) > 1 else "name"
         settled = "are settled" if what == "names" else "is settled"

@@ -2,8 +2,8 @@
 //!
 //! What a bus, a driver or a sampled controller does to a command. In a step in which the command
 //! that is seen changes the valve passes the mean of the flows before and after, so that a shift of
-//! less than a step counts and has a slope. Three lags in its place, as `lag_and_delay` has them, round every edge over a time as
-//! long as the delay itself.
+//! less than a step counts and has a slope. Three lags in its place, as `lag_and_delay` has them,
+//! round every edge over a time as long as the delay itself.
 
 use super::{DELAY, LAG_AND_DELAY};
 use crate::blocks::gas::Gas;
