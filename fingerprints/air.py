@@ -22,6 +22,7 @@ from fingerprints.sheet import (
 from pamrs import simulate
 
 __all__ = [
+    "back_pressure",
     "centre_leakage",
     "compressor",
     "dead_band",
@@ -315,6 +316,11 @@ def input_lag(sheet: Sheet) -> None:
 def restriction(sheet: Sheet) -> None:
     """Fills and vents at three openings, and the flow at every opening."""
     _openings(sheet, "flow at 4 bar: short at large openings, both ways")
+
+
+def back_pressure(sheet: Sheet) -> None:
+    """The same, with a silencer behind the exhaust."""
+    _openings(sheet, "flow at 4 bar: short where it vents wide open")
 
 
 def two_areas(sheet: Sheet) -> None:

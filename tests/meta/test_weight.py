@@ -28,7 +28,7 @@ PACKAGES = {
     "diagnosis": 11168,
     "effects": 404,
     "experiments": 1078,
-    "findings": 962,
+    "findings": 961,
     "fit": 2936,
     "library": 71,
     "recordings": 5015,
@@ -41,7 +41,7 @@ PACKAGES = {
 }
 #: The same of what is not the package.
 ASIDE = {
-    "tests": 28012,
+    "tests": 28013,
     "benchmarks/tests": 240,
     "reproduction": 5045,
     "reproduction/tests": 1356,
@@ -49,7 +49,7 @@ ASIDE = {
     "trial/tests": 1235,
 }
 #: All of pamrs: the sum of the budgets is not above it.
-MOST = 37308
+MOST = 37307
 #: Share of a budget that a package may stay below it; with more to spare, the budget is lowered.
 SPARE = 0.01
 

@@ -39,6 +39,7 @@ catalogue! {
     valve_hysteresis,
     valve_centre_leakage,
     valve_area,
+    exhaust_back_pressure,
     input_path_lag,
     tube_flow_restriction,
     line_flow_law,

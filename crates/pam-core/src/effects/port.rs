@@ -20,6 +20,9 @@ pub enum Port {
     /// Valve: what its flow passes through. One effect at most, with one state: what a pressure
     /// sensor in front of it reads.
     Passage,
+    /// Valve: what its flow passes through where it vents. One effect at most, here or at the
+    /// passage.
+    Exhaust,
     /// Valve: a path beside its opening, from the supply to the chamber and from the chamber to the
     /// ambient.
     Clearance,
@@ -250,8 +253,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         share
     }
 
-    /// [`Port::Passage`]: mass flow [kg/s] through an opening between two pressures; against the
-    /// arrow where it vents.
+    /// [`Port::Passage`], [`Port::Exhaust`]: mass flow [kg/s] through an opening between two
+    /// pressures; against the arrow of the passage where it vents.
     fn through(
         &self,
         gas: &Gas,

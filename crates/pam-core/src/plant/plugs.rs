@@ -332,6 +332,7 @@ impl Ports {
                 self.tap[gas] = self.tap[gas].or(Some((k, acting)));
                 self.passage[k].replace(acting)
             }
+            (Port::Exhaust, Place::Valve(k)) => self.passage[k].replace(acting),
             (Port::Law, Place::Line(k)) => self.law[k].replace(acting),
             (Port::Clearance, Place::Valve(k)) => {
                 push(&mut self.flows, (Flow::Clearance(k), acting))

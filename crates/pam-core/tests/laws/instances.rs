@@ -200,6 +200,10 @@ fn a_port_for_one_effect_takes_one() {
         assert!(text.contains(word), "{text}");
     }
     assert!(rig(vec![lag("pressure_lag", "extensor"), lag("second_lag", "flexor")]).is_ok());
+    let hose = effect("tube_flow_restriction", &[("conductance", 1e-8), ("tap", 0.0)]);
+    let silencer = effect("exhaust_back_pressure", &[("conductance", 1e-8)]);
+    let text = refusal(antagonists(), vec![hose, silencer]);
+    assert!(text.contains("cannot both act on valve.flexor"), "{text}");
     // No two effects of the catalogue want such a port.
     let single = [Port::Passage, Port::Balance, Port::Hanging, Port::Mounting, Port::Reading];
     for port in single {

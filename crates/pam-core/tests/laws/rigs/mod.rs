@@ -215,6 +215,7 @@ pub const TYPICAL: &[Typical] = &[
         &[("conductance", 0.0)],
     ),
     typical("valve_area", &[("excess", 0.15)], &[("excess", 0.0)]),
+    typical("exhaust_back_pressure", &[("conductance", 3e-10)], &[("conductance", 1.0)]),
     typical(
         "input_path_lag",
         &[("time_constant", 0.012), ("delay", 0.015)],
