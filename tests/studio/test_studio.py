@@ -491,10 +491,10 @@ def test_the_whole_way(page: Page) -> None:
 
 @pytest.mark.slow
 def test_the_next_experiment_is_there_to_take(tmp_path: Path) -> None:
-    folder = tmp_path / "case"
-    folder.mkdir()
-    for name in ("bench.csv", "rig.toml"):
-        shutil.copy(EXAMPLE.parent / "bench" / name, folder)
+    bench, folder = EXAMPLE.parent / "bench", tmp_path / "case"
+    shutil.copytree(bench, folder, ignore=shutil.ignore_patterns("map.csv"))
+    rig = str(folder / "rig.toml")
+    assert main(["fit", "map", str(bench / "map.csv"), "--muscle", rig, "--rig", rig]) == 0
     with served(Studio(folder)) as page:
         assert page.press("confirm", logs=page.as_proposed()) == ""
         page.press("check")
