@@ -95,7 +95,7 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             "exhaust_back_pressure",
             "shoulder",
             "fills and vents at three openings, and the flow at every opening (the arm held)",
-            "fills as modelled, wide open vents short of flow at low pressures",
+            "fills and small vents as modelled, wide open vents short of flow",
             air.back_pressure,
         ),
         Experiment(
