@@ -24,7 +24,7 @@ pub const INFO: EffectInfo = EffectInfo {
     acts_in: &["chamber", "flow"],
     source: "ISO 6358-3; Beater, Pneumatic Drives (2007), ch. 4",
     forms: &[Form {
-        name: "iso_6358",
+        name: "silencer",
         parameters: &[EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8)
             .starts(&[1.2e-8])
             .off(NONE)
