@@ -190,9 +190,9 @@ def test_the_derivatives_are_those_of_the_simulation(name, effect):
     # the friction of a muscle follows what gives as it does the joint: the differences leave it
     rig = rig.with_parameters(
         {
-            name: 0.0
-            for name in rig.parameters
-            if effect == "tendon_give" and name.endswith(("friction_coefficient", "friction_floor"))
+            own: 0.0
+            for own in rig.parameters
+            if effect == "tendon_give" and own.endswith(("friction_coefficient", "friction_floor"))
         }
     )
     agrees(rig, settle(rig, given), held=())

@@ -65,7 +65,7 @@ def by_blocks(rig: pamrs.Rig) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("supply", ["tank", "regulator"])
 def test_all_at_once_run_and_restart_bit_for_bit(supply: str) -> None:
     rig = with_outlet() if supply == "tank" else regulated()
-    for effect in sorted(EFFECTS.keys() - {"exhaust_back_pressure"}):  # a valve has it or a hose
+    for effect in (e for e in EFFECTS if e != "exhaust_back_pressure"):  # a valve has it or a hose
         if effect.startswith("supply_regulator") == (supply == "regulator"):
             rig = rig.with_effect(effect)
     whole, first = (pamrs.Simulator(rig, sample_time=0.01, initial=START) for _ in range(2))

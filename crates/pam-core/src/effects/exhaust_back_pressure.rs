@@ -5,12 +5,11 @@
 //! at which both pass the same mass, `m_v(p, p_e) = m_s(p_e, p_a)`, as at a hose
 //! ([`super::tube_flow_restriction`]), here behind the valve and only where it vents. The silencer
 //! has a sonic conductance and a critical ratio of 0.3 by ISO 6358-3 (2014). While the opening is
-//! choked the node is not heard: the vent is short of flow where it is wide open and its pressure
-//! has fallen. Beater, *Pneumatic Drives* (2007), ch. 4. A conductance of [`NONE`] or more restricts
-//! nothing. At a valve with a hose that is an effect, one of both acts.
+//! choked the node is not heard, so that vents through small openings flow as they did. Beater,
+//! *Pneumatic Drives* (2007), ch. 4. At a valve with a hose that is an effect, one of both acts.
 
-use super::tube_flow_restriction::{mass_flow, tube, Passage, NONE};
-use super::{Effect, EffectInfo, EffectParameter, Form, Port, Use};
+use super::tube_flow_restriction::{tube, Hose, CONDUCTANCE};
+use super::{Effect, EffectInfo, Form, Port};
 use crate::blocks::gas::Gas;
 use crate::blocks::valve::Opening;
 use crate::made_by;
@@ -25,12 +24,7 @@ pub const INFO: EffectInfo = EffectInfo {
     source: "ISO 6358-3; Beater, Pneumatic Drives (2007), ch. 4",
     forms: &[Form {
         name: "silencer",
-        parameters: &[EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8)
-            .starts(&[1.2e-8])
-            .off(NONE)
-            .role(Use::Size)
-            .restricts()
-            .like("valve.discharge_area_max")],
+        parameters: &[CONDUCTANCE],
         states: &[],
         integrates: false,
         ports: &[Port::Exhaust],
@@ -39,13 +33,12 @@ pub const INFO: EffectInfo = EffectInfo {
     ..EffectInfo::USUAL
 };
 
-/// A silencer; None where it restricts nothing.
+/// A silencer: behind the opening where the valve vents, as a hose is where it fills.
 #[derive(Debug, Clone, Copy)]
-struct Silencer<S>(Option<Passage<S>>);
+struct Silencer<S>(Hose<S>);
 
 fn make<S: Scalar>(values: &[S], gas: &Gas) -> Box<dyn Effect<S>> {
-    let restricts = values[0].re() < NONE;
-    Box::new(Silencer(restricts.then(|| tube(values[0], gas.temperature))))
+    Box::new(Silencer(Hose::new(values[0], tube(values[0], gas.temperature), false)))
 }
 
 impl<S: Scalar> Effect<S> for Silencer<S> {
@@ -57,17 +50,17 @@ impl<S: Scalar> Effect<S> for Silencer<S> {
         downstream: S,
         venting: bool,
     ) -> S {
-        match &self.0 {
-            Some(silencer) if venting => {
-                mass_flow(gas, opening, silencer, upstream, downstream, false)
-            }
-            _ => opening.mass_flow(gas, upstream, downstream),
+        if venting {
+            self.0.through(gas, opening, upstream, downstream, false)
+        } else {
+            opening.mass_flow(gas, upstream, downstream)
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::tube_flow_restriction::NONE;
     use super::*;
 
     #[test]

@@ -27,7 +27,8 @@ use crate::dual::Slope;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-const CONDUCTANCE: EffectParameter =
+/// Conductance of what is in series with a valve.
+pub(super) const CONDUCTANCE: EffectParameter =
     EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8)
         .starts(&[1.2e-8])
         .off(1.0)
@@ -271,17 +272,21 @@ impl Series<'_, f64> {
 
 /// A hose behind a valve; its state is what a pressure sensor at its beginning reads.
 #[derive(Debug, Clone, Copy)]
-struct Hose<S> {
+pub(super) struct Hose<S> {
     /// None where it restricts nothing.
     tube: Option<Passage<S>>,
     tapped: bool,
 }
 
+impl<S: Scalar> Hose<S> {
+    /// A hose of a conductance; a `tapped` one has the pressure sensor at the valve's end.
+    pub(super) fn new(conductance: S, passage: Passage<S>, tapped: bool) -> Self {
+        Self { tube: (conductance.re() < NONE).then_some(passage), tapped }
+    }
+}
+
 fn hose<S: Scalar>(values: &[S], passage: Passage<S>) -> Box<dyn Effect<S>> {
-    Box::new(Hose {
-        tube: (values[0].re() < NONE).then_some(passage),
-        tapped: values[1].re() >= AT_VALVE,
-    })
+    Box::new(Hose::new(values[0], passage, values[1].re() >= AT_VALVE))
 }
 
 fn make<S: Scalar>(values: &[S], gas: &Gas) -> Box<dyn Effect<S>> {
